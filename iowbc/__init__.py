@@ -1,7 +1,7 @@
 """Interaction-oriented whole-body control: recipes, training, evaluation and export of the paper's controller.
 
-The names below are what users' own code imports; each is read from its module when it is first asked for. Nothing else
-is imported here, not even `typing`: Ctrl-C is answered as soon as this file has been read (`iowbc/__main__.py`).
+The names below are the public API; each is imported from its module on first access. Nothing else is imported here, not
+even `typing`, so that the Ctrl-C handler of `iowbc/__main__.py` is installed early.
 """
 
 import os
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from iowbc.recipe.recipe import Recipe
     from iowbc.task.vector.vector_env import VectorEnv
 
-os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")  # onnxruntime reads it when it loads; else it sends reports home
+os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")  # read when onnxruntime is imported; it sends telemetry otherwise
 
 __version__ = "0.2.0"
 __all__ = [

@@ -11,8 +11,8 @@ def leave_while_reading() -> None:
 
 
 def load_no_graphics() -> None:
-    """From now on mujoco loads without a library to draw with, in this process and in those that it starts: one that is
-    asked for and missing would end commands that draw nothing. What draws reads `IOWBC_GL` (`iowbc.sim.rendering`)."""
+    """Make mujoco load no graphics library in this process and its children: a missing one would abort commands that
+    draw nothing. Code that draws reads `IOWBC_GL` (`iowbc.sim.rendering`)."""
     os.environ.setdefault("IOWBC_GL", os.environ.get("MUJOCO_GL", ""))
     os.environ["MUJOCO_GL"] = "off"
 

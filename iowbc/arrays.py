@@ -1,4 +1,4 @@
-"""The kinds of array that functions take and give, indices as slices, and one source for NumPy and torch."""
+"""Array types of arguments and results, indices as slices, and code shared by NumPy and torch."""
 
 import copy
 import sys
@@ -13,13 +13,13 @@ Array = NDArray[Any]
 Indices = NDArray[np.int64]
 """Places along an axis."""
 Mask = NDArray[np.bool_]
-"""True for those that are meant."""
+"""True for the selected elements."""
 Keys = NDArray[np.uint64]
 """Keys of counter-based random numbers."""
 
 
 def as_slice(indices: Indices) -> slice | Indices:
-    """Indices at equal distances as a slice, of which NumPy takes views and which it copies several times faster."""
+    """Evenly spaced indices as a slice, which NumPy views without a copy and copies several times faster."""
     steps = np.unique(np.diff(indices)) if len(indices) > 1 else np.ones(1, np.int64)
     if not len(indices) or len(steps) != 1 or steps[0] < 1:
         return indices
@@ -27,9 +27,9 @@ def as_slice(indices: Indices) -> slice | Indices:
 
 
 def namespace(array: Any) -> Any:
-    """The functions for an array: NumPy's, or torch's for a tensor, which an equation meets as it is exported.
+    """The module of array functions: NumPy, or torch for a tensor, as in an equation that is being exported.
 
-    Both know `concatenate`, `stack`, `where`, `swapaxes` and the elementwise functions by these names.
+    Both have `concatenate`, `stack`, `where`, `swapaxes` and the elementwise functions by these names.
     """
     return np if isinstance(array, np.ndarray | np.generic) else sys.modules["torch"]
 
@@ -43,7 +43,7 @@ class Constants:
     """An object that holds constants only: its arrays may be of another kind."""
 
     def converted(self, convert: Callable[[Array], Any]) -> Self:
-        """The same with other floating-point arrays, such as tensors, in it and in the constants that it holds."""
+        """A copy with every floating-point array converted, also in nested `Constants`."""
         other = copy.copy(self)
         for name, value in vars(self).items():
             object.__setattr__(other, name, _converted(value, convert))

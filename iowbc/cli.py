@@ -67,7 +67,7 @@ BENCHMARKS = {
 
 
 class LazyCommand(TyperCommand):
-    """A command that is listed by its name and help alone; its callback imports the function behind it."""
+    """A command listed by name and help; its callback imports the function when the command is called."""
 
     def make_context(self, *arguments: Any, **settings: Any) -> Any:
         """The context of the command with its own parameters."""
@@ -131,7 +131,7 @@ def main(arguments: list[str] | None = None) -> None:
             code = ended.code
             sys.stdout.flush()
     except BrokenPipeError:
-        code = 1  # a reader that has gone away, as of `| head`
+        code = 1  # the reader has closed the pipe, as `| head` does
     except Exception as error:
         from iowbc.errors import IowbcError
 

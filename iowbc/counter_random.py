@@ -89,7 +89,7 @@ BYTE_MEAN, BYTE_VARIANCE = 127.5, (256.0**2 - 1.0) / 12.0
 def noise(key: Keys, step: NDArray[np.uint64], width: int) -> Array:
     """x ~ nearly N(0, 1) for each environment's step, shape (n, width), width even: sums of four random bytes.
 
-    Mean 0, variance 1, kurtosis 2.7, bounded by 2√3, in steps of 0.007. Several times faster than `normal`.
+    Mean 0, variance 1, kurtosis 2.7, bounded by 2√3, in steps of 0.007. Several times faster than exact draws.
     """
     word = mix((key + step * STEP)[:, None] + _lanes(width // 2))
     sums = word & BYTES

@@ -25,7 +25,7 @@ PROBLEMS_TOLD = 50
 
 @dataclass(frozen=True)
 class Problem:
-    """One thing that is wrong, and where it stands."""
+    """One problem and its place."""
 
     place: str
     text: str
@@ -38,7 +38,7 @@ class IowbcError(Exception):
     """Base of all errors that are raised on purpose."""
 
     exit_code = 1
-    """With which a command ends that raised it."""
+    """Exit code of a command that raised it."""
 
 
 class UsageError(IowbcError):
@@ -51,7 +51,7 @@ class RecipeError(UsageError):
     """A recipe, or an override of it, is wrong. Holds the first problems found, and how many more there are."""
 
     def __init__(self, problems: Sequence[Problem], further: int = 0) -> None:
-        """`further`: problems that were found and are not among those given."""
+        """`further`: number of problems beyond those given."""
         self.problems = list(problems[:PROBLEMS_TOLD])
         self.further = further + len(problems) - len(self.problems)
         more = [f"and {self.further:,} more problems"] if self.further else []
@@ -67,7 +67,7 @@ class PipelineFailed(IowbcError):
 
 
 class Interrupted(IowbcError):
-    """Somebody asked to stop; the text says what is kept."""
+    """Stopped by request; the text says what is kept."""
 
     exit_code = 130
 

@@ -1,7 +1,7 @@
-"""Files that are whole or not there: a reader, or a crash while one is written, meets the old content or the new.
+"""Atomic file writes: a reader, also after a crash during a write, finds either the old content or the new.
 
-A checked file also proves that it is what was written, and for whom: before its content stands a line of JSON with the
-key that it belongs to and the SHA-256 of key and content.
+A checked file is also protected by a checksum: its first line is JSON with the key that it belongs to and the SHA-256
+of key and content.
 """
 
 import errno
@@ -38,7 +38,7 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 def write_whole(path: Path, text: str) -> None:
-    """Write a text in place of a file, or where there is none."""
+    """Create or replace a text file atomically."""
     with replacing(path) as fresh:
         fresh.write_text(text, encoding="utf-8")
 
@@ -62,8 +62,8 @@ def move_folder(source: Path, target: Path) -> None:
 
 
 def replace_folder(source: Path, target: Path) -> None:
-    """Put a folder in the place of another, which is gone only when the new one stands: what dies between leaves the
-    old one as `.NAME.old`, and the next call brings it back."""
+    """Replace a folder by another. The old one is removed last: a crash in between leaves it as `.NAME.old`, and the
+    next call restores it."""
     old = target.with_name(f".{target.name}{OLD}")
     restore_folder(old)
     if target.exists():
@@ -73,7 +73,7 @@ def replace_folder(source: Path, target: Path) -> None:
 
 
 def restore_folder(old: Path) -> None:
-    """Bring back a folder that was put aside by `replace_folder` and has no successor; else remove it."""
+    """Restore a folder that `replace_folder` set aside if nothing has replaced it; else remove it."""
     target = old.with_name(old.name.removeprefix(".").removesuffix(OLD))
     if old.is_dir() and not target.exists():
         os.rename(old, target)
@@ -107,7 +107,7 @@ def synchronise(path: Path) -> None:
 
 
 def write_checked(path: Path, key: str, content: bytes, *, keep_previous: bool = False) -> None:
-    """Write a checked file in place of the one at `path`, which stays beside it where `keep_previous` is set."""
+    """Write a checked file at `path`; `keep_previous` keeps the one that was there as its previous version."""
     head = json.dumps({"key": key, "sha256": _digest(key, content)}).encode()
     with replacing(path) as fresh:
         fresh.write_bytes(head + b"\n" + content)
@@ -133,9 +133,9 @@ def read_checked(path: Path, key: str) -> bytes | None:
 
 
 def newest_checked(path: Path, key: str) -> tuple[bytes | None, list[str]]:
-    """Content of the newest whole checked file, at `path` or the one before it, and the names of damaged ones.
+    """Content of the newest intact checked file, at `path` or its previous version, and the names of damaged ones.
 
-    Damaged ones are put aside as `<name>.damaged`, lest the next write keeps one of them as the previous file.
+    Damaged files are renamed to `<name>.damaged`, so that the next write does not keep one as the previous version.
     """
     damaged: list[str] = []
     for candidate in (path, previous(path)):
@@ -151,7 +151,7 @@ def newest_checked(path: Path, key: str) -> tuple[bytes | None, list[str]]:
 
 
 def previous(path: Path) -> Path:
-    """Where the checked file before the one at `path` is kept."""
+    """Path of the previous version of a checked file."""
     return path.with_suffix(".previous")
 
 

@@ -1,4 +1,4 @@
-"""Whether an error says that nothing more can be written, and what it is that is full."""
+"""Detection of errors caused by a full disk, quota or file-size limit, and the disk or file that is full."""
 
 import errno
 import os
@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-"""Errors of a disk without room, of a used-up quota, and of a limit on the size of files."""
+"""Errors of a full disk, an exhausted quota, and the file-size limit."""
 TEXTS = ("No space left on device", "Disk quota exceeded", "File too large", "PytorchStreamWriter failed writing")
 """What libraries say that turn such an error into one of their own."""
 ROOM = 100_000
@@ -15,7 +15,7 @@ ROOM = 100_000
 
 
 def nothing_fits(error: BaseException) -> bool:
-    """Whether an error, or one that led to it, says that nothing more can be written."""
+    """True if an error, or one in its chain of causes, means that nothing more can be written."""
     return any(
         (isinstance(found, OSError) and found.errno in FULL) or any(text in str(found) for text in TEXTS)
         for found in _chain(error)
@@ -23,7 +23,7 @@ def nothing_fits(error: BaseException) -> bool:
 
 
 def what_is_full(error: BaseException, places: Sequence[Path]) -> str:
-    """What has no room: the disk of one of the places, with what is free there, else the file that an error names."""
+    """Disk that is full, with its free bytes, else the file that an error names."""
     files = [str(found.filename) for found in _chain(error) if isinstance(found, OSError) and found.filename]
     for place in (*(Path(file).parent for file in files), *places):
         if (free := _free(place)) is not None and free < ROOM:

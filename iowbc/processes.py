@@ -1,4 +1,4 @@
-"""Processes of our own: they die with their parent, have one thread of linear algebra each, and fit this machine."""
+"""Child processes that end with their parent and use one thread of linear algebra each; the available cores."""
 
 import ctypes
 import os
@@ -38,8 +38,8 @@ def keep_freed_memory() -> None:
 
 
 def name_glfw() -> None:
-    """Tells glfw, which mujoco loads, where its library is: else it asks a Python of its own for the library's version,
-    which prints a traceback where the training is ended meanwhile."""
+    """Set the library path of glfw, which mujoco imports. Without it glfw starts another Python to read the library's
+    version, which prints a traceback if the training is ended meanwhile."""
     found = find_spec("glfw")
     if found is not None and found.origin is not None:
         session = "wayland" if os.environ.get("XDG_SESSION_TYPE") == "wayland" else "x11"
@@ -49,10 +49,10 @@ def name_glfw() -> None:
 
 
 def die_with_parent(parent: int, *, bound: bool = True, number: int = signal.SIGKILL) -> None:
-    """Ends this process when its parent, process number `parent`, is gone: at once where it already is.
+    """End this process when its parent, process `parent`, ends; at once if it has ended already.
 
-    `bound`: let the kernel send it signal `number`. Only a process that the parent's main thread started may ask for
-    that, for what counts is the end of the thread.
+    `bound`: the kernel sends signal `number`. Set it only in a process that the parent's main thread started, because
+    the kernel watches the thread that started it.
     """
     if bound:
         ctypes.CDLL(None).prctl(PARENT_DEATH_SIGNAL, number, 0, 0, 0)

@@ -1,4 +1,4 @@
-"""The yardstick: a bare loop of `mj_step` over the models and states of a vector environment, and nothing else."""
+"""Baseline: a bare loop of `mj_step` over the models and states of a vector environment."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -26,7 +26,7 @@ def random_actions(step: int, rows: int, columns: int) -> Array:
 
 @dataclass
 class RecordedSteps:
-    """Requests of environments to MuJoCo in some control periods: models, and states with controls and forces."""
+    """Recorded MuJoCo inputs of environments over some control periods: models, and states with controls and forces."""
 
     models: list[Any]
     states: Array
@@ -34,7 +34,7 @@ class RecordedSteps:
     substeps: int
 
     def run(self) -> float:
-        """Steps every environment through every period; the time that `mj_step` took [s]."""
+        """Steps every environment through every period; returns the time in `mj_step` [s]."""
         data = [mujoco.MjData(model) for model in self.models]
         begin = time.perf_counter()
         for states in self.states:
@@ -49,7 +49,7 @@ class RecordedSteps:
 
 
 def record(setup: Setup, first: int, last: int, periods: int) -> RecordedSteps:
-    """Lets environments of one scene play from a reset and keeps what they asked of MuJoCo."""
+    """Runs environments of one scene from a reset and records their MuJoCo inputs."""
     batch = setup.batch(first, last, private_buffers(setup.buffer_fields(), last - first))
     batch.reset(np.arange(first, last, dtype=np.uint64) + np.uint64(setup.seed))
     (world,) = batch.simulation.worlds
@@ -73,10 +73,10 @@ def record(setup: Setup, first: int, last: int, periods: int) -> RecordedSteps:
 
 @contextmanager
 def bare_loops(setup: Setup, groups: list[tuple[int, int]], periods: int) -> Iterator[Callable[[], float]]:
-    """The bare loop in several processes at once, each over its share of the environments: a function that measures
-    the environment steps a second of all together, the slowest counting.
+    """The bare loop in several processes, each with its share of the environments: a function that measures their total
+    rate, limited by the slowest process [environment steps/s].
 
-    Raises BrokenProcessPool where a process cannot record its steps.
+    Raises BrokenProcessPool if a process cannot record its steps.
     """
     context = get_context("spawn")
     with ExitStack() as stack:
@@ -97,7 +97,7 @@ def bare_loops(setup: Setup, groups: list[tuple[int, int]], periods: int) -> Ite
 
 
 _recorded: RecordedSteps
-"""The steps of a process of `bare_loops`."""
+"""Recorded steps of this worker process of `bare_loops`."""
 
 
 def _prepare(setup: Setup, first: int, last: int, periods: int) -> None:

@@ -1,4 +1,4 @@
-"""The parts of a step of the vector environment, and the time of each."""
+"""Time of each part of a step of the vector environment."""
 
 import time
 from collections.abc import Callable
@@ -18,7 +18,7 @@ observations; signals, counters and the like."""
 
 
 class Stopwatch:
-    """Adds up the processor time that methods take in this thread: what other programs do does not count."""
+    """Accumulates the CPU time of methods in this thread, which excludes other programs."""
 
     def __init__(self) -> None:
         self.spent: dict[str, float] = {}
@@ -38,7 +38,7 @@ class Stopwatch:
 
 
 class _Timed:
-    """MuJoCo's batch, which takes no attributes, with methods of its own."""
+    """Wrapper of MuJoCo's batch, which does not accept attributes."""
 
     def __init__(self, batch: Any) -> None:
         self._batch, self.step, self.forward = batch, batch.step, batch.forward
@@ -48,9 +48,9 @@ class _Timed:
 
 
 def step_breakdown(setup: Setup, periods: int, rounds: int) -> dict[str, float]:
-    """Processor time of each part of a step of `setup.count` environments [ms]: medians over rounds from a reset.
+    """CPU time of each part of a step of `setup.count` environments [ms]: medians over rounds from a reset.
 
-    Also `reset`: what the end of one episode adds.
+    Also `reset`: additional time at the end of an episode.
     """
     workers = InProcess(setup)
     batch, watch = workers.batch, Stopwatch()
@@ -85,7 +85,7 @@ def step_breakdown(setup: Setup, periods: int, rounds: int) -> dict[str, float]:
 
 
 def transfer_time(workers: Workers, rounds: int) -> float:
-    """Time to ask all workers for next to nothing and to copy what a step leaves behind [ms], median."""
+    """Median time of a worker round trip without work, and of copying the results of a step [ms]."""
     times = []
     for _ in range(rounds):
         begin = time.perf_counter()

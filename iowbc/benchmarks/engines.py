@@ -1,4 +1,4 @@
-"""`iowbc bench engines`: experiments in which MuJoCo and Drake must agree, with each other and with a law."""
+"""`iowbc bench engines`: experiments in which MuJoCo and Drake must agree with each other and with theory."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -15,40 +15,40 @@ from iowbc.sim.simulation import Simulation
 from iowbc.sim.state import SimulationState
 
 TIMESTEP = 0.001
-"""Physics step of both engines [s], so short that what they share is not hidden by how they integrate."""
+"""Physics step of both engines [s], short enough that integration errors do not mask the comparison."""
 IMMOVABLE = 1e6
-"""Mass and inertia of a base that is held in the air [kg, kg·m²]."""
+"""Mass and inertia that make a base immovable [kg, kg·m²]."""
 HEIGHT = 2.0
-"""By which a robot is lifted off the ground [m]."""
+"""Height by which a robot is lifted off the ground [m]."""
 STEP = 0.1
-"""Of a joint's target [rad]."""
+"""Step of a joint's target [rad]."""
 LOAD = 8.0
 """Mass of a held object [kg]."""
 CRATE, ROLLING = 40.0, 0.08
-"""Mass of a crate [kg] and its rolling resistance as a part of its weight."""
+"""Mass of a crate [kg] and its rolling resistance as a fraction of its weight."""
 
 
 @dataclass(frozen=True)
 class Agreement:
-    """One figure in both engines."""
+    """One quantity in both engines."""
 
     name: str
     unit: str
     engines: Sequence[float]
-    """In MuJoCo and in Drake; where it is a distance of the two, zero and that."""
+    """Values in MuJoCo and Drake; for a difference between the engines, zero and the difference."""
     law: float = np.nan
-    """Value by a formula; NaN where there is none."""
+    """Theoretical value; NaN if there is none."""
     tolerance: float = np.inf
-    """Difference of the engines that is expected at most."""
+    """Largest expected difference of the engines."""
 
     @property
     def agrees(self) -> bool:
-        """True where the engines differ by no more than the tolerance."""
+        """True if the engines differ by no more than the tolerance."""
         return bool(abs(self.engines[0] - self.engines[1]) <= self.tolerance)
 
 
 def main(folder: Path) -> list[Agreement]:
-    """Runs every experiment, prints the table and returns it. Raises UsageError where Drake is not installed.
+    """Runs every experiment, prints the table and returns it. Raises UsageError if Drake is not installed.
 
     `folder`: of the robot.
     """
@@ -179,7 +179,7 @@ def swinging_box(robot: Robot) -> list[Agreement]:
 def _both(
     robot: Robot, scenes: list[str], gap: float = 0.01, torsion: float | None = None, **fixed: float
 ) -> Iterator[Simulation]:
-    """The same simulation in MuJoCo and in Drake, nothing in it random; `fixed`: quantities that are held."""
+    """The same simulation in MuJoCo and in Drake, without randomness; `fixed`: quantities that are fixed."""
     off = {name: {"enabled": False} for name in ("randomization", "partner", "impulses", "pushes", "sensing")}
     palms = {} if torsion is None else {"torsion": torsion, "by_friction": 0.0, "swing_damping": 0.0}
     usual = Recipe().scenes
@@ -196,7 +196,7 @@ def _both(
 
 
 def _lift(simulation: Simulation) -> None:
-    """Takes robots and what they hold off the ground."""
+    """Lifts robots and held objects off the ground."""
     for world in simulation.worlds:
         world.qpos[:, 2] += HEIGHT
         if world.scene.kind == "lift" and world.layout.object_position is not None:
@@ -204,7 +204,7 @@ def _lift(simulation: Simulation) -> None:
 
 
 def _hold_base(simulation: Simulation) -> None:
-    """Makes bases immovable, in the air."""
+    """Holds the bases immovable in the air."""
     _lift(simulation)
     base = simulation.worlds[0].layout.base
     _edit(simulation, body_mass=(base, IMMOVABLE), body_inertia=(base, IMMOVABLE))
@@ -232,7 +232,7 @@ def _run(
 
 
 def _period(trace: Array) -> float:
-    """Mean period of an oscillation that is seen 50 times a second [s]."""
+    """Mean period of an oscillation sampled at 50 Hz [s]."""
     away = trace - 0.5 * (trace.max() + trace.min())
     before = np.flatnonzero((away[:-1] < 0.0) & (away[1:] >= 0.0))
     crossings = before + away[before] / (away[before] - away[before + 1])

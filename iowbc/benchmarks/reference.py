@@ -1,4 +1,4 @@
-"""`iowbc bench rg`: how fast support postures are labelled, by both methods, on one core and on several."""
+"""`iowbc bench rg`: rate of labelling support postures, by both methods, on one core and on several."""
 
 import tempfile
 import time
@@ -17,7 +17,7 @@ from iowbc.reference.labels.pool import label_all
 from iowbc.robot.description import load_robot, robot_folder
 
 SAMPLES = {"static": (2048, 32), "ocp": (64, 2)}
-"""Samples for each worker by method, and samples in a shard: few, so that workers are busy until the end."""
+"""Samples per worker by method, and samples per shard: few, so that workers are busy until the end."""
 
 
 def main(
@@ -26,11 +26,11 @@ def main(
     workers: Sequence[int] = (),
     turns: int = 3,
 ) -> dict[str, float]:
-    """Measures, prints the table, returns every figure by name (rates in kept labels a second).
+    """Measures, prints the table, returns every rate by name (kept labels a second).
 
-    `workers`: counts to measure, by default 1, 2 and the number of cores. All counts take turns, and the best turn of
-    each counts: the one that other programs disturbed least. The start of the processes is left out. Rates "a core" are
-    by processor time: what a core gives that is not shared with other programs.
+    `workers`: counts to measure, by default 1, 2 and the number of cores. All counts are measured `turns` times,
+    alternately; the best repetition counts, as the least disturbed one. The start of the processes is left out. Rates
+    "a core" are per CPU time: the rate of a core that no other program uses.
     """
     recipe = recipe or Recipe(name="bench")
     folder = robot_folder(recipe.robot)
@@ -51,7 +51,7 @@ def main(
 
 
 def _pace(robot: Path, rg: ReferenceGenerator, seed: int, drawn: int, workers: int) -> tuple[float, float, float]:
-    """Kept labels a second, and a second of processor time, from the first finished shard of each worker to the last of
+    """Kept labels per second and per second of CPU time, from the first finished shard of each worker to the last of
     all; fraction of the samples that were kept."""
     samples, chunk = SAMPLES[rg.method]
     count = min(samples * workers, drawn)

@@ -1,4 +1,4 @@
-"""`iowbc bench sim`: the vector environment against a bare loop of `mj_step`, and against usual vector environments."""
+"""`iowbc bench sim`: the vector environment against a bare loop of `mj_step`, and against other vector environments."""
 
 import time
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ from iowbc.task.vector.setup import Setup
 from iowbc.task.vector.vector_env import VectorEnv
 
 PERIODS = 40
-"""Control steps from a reset that are measured: nobody has fallen yet, so that both loops step the same states."""
+"""Measured control steps from a reset: no robot has fallen yet, so that both loops step the same states."""
 EPISODE = 10.0
 """Length of an episode [s] over which the cost of a reset is spread."""
 
@@ -37,9 +37,9 @@ def main(
 ) -> dict[str, float]:
     """Measures, prints the tables, returns every figure by name (rates in environment steps a second, times in ms).
 
-    `environments` a worker; `workers`: counts to measure, by default 1, 2 and the number of cores. The bare loop and
-    the vector environment take turns. Rates are those of the best turn, which other programs disturbed least; the ratio
-    is the median over turns, each of the environment's against the bare loop's before it.
+    `environments`: per worker; `workers`: counts to measure, by default 1, 2 and the number of cores. The bare loop and
+    the vector environment alternate, `turns` times. Rates are of the best repetition, which other programs disturbed
+    least; the ratio is the median over repetitions, each of the environment's rate to that of the bare loop before it.
     `others`: also measure stable-baselines3's and gymnasium's vector environments.
     """
     cores = available_cores()
@@ -65,7 +65,7 @@ def main(
 
 
 def _against_bare(setup: Setup, count: int, turns: int, resets: float) -> dict[str, float]:
-    """Rates of the bare loop and of the vector environment in turn, with `count` processes.
+    """Rates of the bare loop and of the vector environment, alternately, with `count` processes.
 
     `resets`: time in which all environments of a worker begin an episode, one after another [ms].
     """
@@ -104,7 +104,7 @@ def _rate(env: VectorEnv) -> float:
 
 
 def _others(specification: Specification, scene: str, count: int, own: float) -> dict[str, float]:
-    """Rates of the usual vector environments, the best of five: one environment a process, `count` processes."""
+    """Rates of other vector environments, the best of five: one environment per process, `count` processes."""
     make = partial(Environment, scene, specification.recipe, specification.robot, specification.rg)
     width = load_robot(specification.robot).support.size
     figures = {}

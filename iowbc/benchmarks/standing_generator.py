@@ -1,4 +1,4 @@
-"""The world of a benchmark: one scene, and a stand-in for the reference generator at the cost of a fitted one."""
+"""World of a benchmark: one scene, and a reference generator that always stands, at the cost of a fitted one."""
 
 import itertools
 import tempfile
@@ -41,7 +41,7 @@ def write_standing_generator(folder: Path, robot: Robot, recipe: ReferenceGenera
 
 @contextmanager
 def generator_of(robot: Path, recipe: Recipe) -> Iterator[Path]:
-    """The folder of a stand-in for a fitted reference generator, while needed."""
+    """Temporary folder of a stand-in for a fitted reference generator."""
     with tempfile.TemporaryDirectory() as place:
         write_standing_generator(Path(place), load_robot(robot), recipe.rg)
         yield Path(place)

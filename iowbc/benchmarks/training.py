@@ -1,4 +1,4 @@
-"""`iowbc bench train`: the teacher's training against stable-baselines3's PPO over SubprocVecEnv, turn by turn."""
+"""`iowbc bench train`: the teacher's training against stable-baselines3's PPO over SubprocVecEnv, alternately."""
 
 import time
 from functools import partial
@@ -23,7 +23,7 @@ from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv
 
 PARTS = ("simulation", "inference", "learning", "rest")
-"""Of an update: waiting for the environments, acting, gradient steps with what they need, and everything else."""
+"""Parts of an update: waiting for environments, inference, gradient steps with their preparation, and the rest."""
 
 
 def main(
@@ -35,8 +35,8 @@ def main(
 ) -> dict[str, float]:
     """Measures, prints a table, returns every figure by name (rates in environment steps a second, times in s).
 
-    Both trainings make updates of equally many samples, epochs and minibatches with networks of the same size, in turn.
-    Rates are those of the best turn, which other programs disturbed least; the ratio is the median over turns.
+    Both trainings alternate, with equally many samples, epochs and minibatches per update and networks of one size.
+    Rates are of the best repetition, which other programs disturbed least; the ratio is a median over repetitions.
     `others`: processes of stable-baselines3, each with one environment; by default one a core. 0 leaves it out.
     """
     cores = available_cores()
@@ -77,7 +77,7 @@ def main(
 
 
 def _plain(given: Specification, scene: str, count: int, samples: int) -> Any:
-    """stable-baselines3's PPO as it comes, with the recipe's numbers."""
+    """stable-baselines3's unmodified PPO with the recipe's hyperparameters."""
     settings, make = given.recipe.teacher, partial(Environment, scene, given.recipe, given.robot, given.rg)
     hidden = list(settings.hidden)
     torch.set_num_threads(available_cores())

@@ -1,4 +1,4 @@
-"""`iowbc bench carry`: a controller that others trained in the fixed suite, and its result on one page."""
+"""`iowbc bench carry`: evaluation of an external controller on the fixed suite, with a page of results."""
 
 import json
 import os
@@ -27,7 +27,7 @@ NO_DRAKE = "not installed: pip install 'iowbc[drake]'"
 DECIDING = ("simulation", "task", "eval")
 """Sections of the suite that decide its trials."""
 EARLY = 2.0
-"""Mean time to a fall without an object that points to an adapter that does not fit [s]: a walker stands so long."""
+"""Mean time to a fall without an object below which the adapter is suspected [s]: a working walker stands longer."""
 FIGURES = {
     "E_v": (Column("E_v", "m/s"), ".3f"),
     "E_psi": (Column("E_ψ", "rad"), ".3f"),
@@ -147,7 +147,7 @@ def _suite_row(file: Path, trials: "pd.DataFrame") -> str:
 
 
 def suite_digest(suite: Recipe) -> str:
-    """SHA-256 of what decides the trials of a suite, whatever controller plays them."""
+    """SHA-256 of the sections that determine a suite's trials; independent of the controller."""
     values = deciding(suite)
     return data_digest({name: values[name] for name in DECIDING})
 
@@ -191,6 +191,6 @@ def _in_drake(mujoco: "pd.DataFrame", drake: "pd.DataFrame | None") -> tuple[Cel
 
 
 def _falls_early(trials: "pd.DataFrame") -> bool:
-    """True where it falls at once without an object, which points to its adapter."""
+    """True if the controller always falls early without an object, which suggests a wrong adapter."""
     alone = trials.loc[(trials["mass"] == 0) & ~trials["survived"], "seconds"]
     return len(alone) == int((trials["mass"] == 0).sum()) > 0 and bool(alone.mean() < EARLY)

@@ -103,7 +103,7 @@ def report(
     ] = None,
     runs: options.RunsFolder = options.RUNS,
 ) -> None:
-    """Write one HTML file about what the words name, which opens anywhere without a network. Raises `UsageError`."""
+    """Write one self-contained HTML file about runs, readable offline. Raises `UsageError`."""
     store, console = Store(Runs(runs)), stdout_console()
     if log is not None:
         from iowbc.commands.robot_log import report_log
@@ -137,8 +137,8 @@ def report(
 
 
 def _joined(store: Store, found: Sequence[Run]) -> tuple[list[Table], dict[str, bytes]]:
-    """The result tables of one run; of several those over all their trials, and by file name their pictures and their
-    film side by side, where there is one."""
+    """Result tables of one run; for several runs the tables over all their trials, and their joint figures and film by
+    file name."""
     evaluated = [run.artifacts["eval"] for run in found if "eval" in run.artifacts]
     if len(evaluated) < 2:
         return [table for one in evaluated for table in tables_of(one)], {}
@@ -191,10 +191,10 @@ def _having(runs: Sequence[Run], name: str) -> list[Run]:
 
 
 def _told_apart(runs: Sequence[Run], name: str, together: bool = True) -> "tuple[list[pd.DataFrame], dict[str, str]]":
-    """A table of each run's evaluation, and the labels of variants that go by another name.
+    """A table of each run's evaluation with unambiguous variant names, and the original labels of renamed variants.
 
-    Runs that differ in their seed alone are trainings of one variant, unless `together` is false; a variant is called
-    by its first run where another one has its label.
+    Runs that differ only in their seed are trainings of one variant, unless `together` is false. A variant whose label
+    is not unique is named after its first run.
     """
     import pandas as pd
 
@@ -213,7 +213,7 @@ def _told_apart(runs: Sequence[Run], name: str, together: bool = True) -> "tuple
 
 
 def _report_probes(found: Sequence[Run], output: Path) -> None:
-    """Knowledge of the load in the histories of all runs that were probed."""
+    """Write the report of all probed runs: how well the object's mass can be read from their histories."""
     import pandas as pd
 
     from iowbc.evaluation.report.probe import write_probe

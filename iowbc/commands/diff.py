@@ -23,7 +23,7 @@ from iowbc.recipe.recipe import Recipe
 from iowbc.report.runs import Run
 
 ABSENT = "(absent)"
-"""In place of a value that one of the two has not."""
+"""Shown for a value that one of the two lacks."""
 
 
 def diff(
@@ -32,7 +32,7 @@ def diff(
     as_json: options.AsJson = False,
     runs: options.RunsFolder = options.RUNS,
 ) -> None:
-    """Print the differences. Each of the two is whatever `show` takes, or a recipe file that has not run."""
+    """Print the differences. Arguments as for `show`, or a recipe file that has not run."""
     store, console = Store(Runs(runs)), stdout_console()
     lines = list(difference_lines(_either(store, first), _either(store, second)))
     if as_json:
@@ -43,7 +43,7 @@ def diff(
 
 
 def difference_lines(a: Run, b: Run) -> Iterator[str]:
-    """Differences of two recipes or artifacts, a line each, those of a stage together."""
+    """Differences of two recipes or artifacts, one per line, grouped by stage."""
     yield from _changes("", _today(a.recipe), _today(b.recipe))
     for stage in dict.fromkeys([*a.artifacts, *b.artifacts]):
         old, new = a.artifacts.get(stage), b.artifacts.get(stage)
@@ -55,8 +55,8 @@ def difference_lines(a: Run, b: Run) -> Iterator[str]:
 
 
 def _either(store: Store, word: str) -> Run:
-    """A recipe file counts as it is now, and so does one by its name that has not run; its artifacts are those that it
-    used last."""
+    """The run that a word names. For a recipe file, or the name of one that has not run, the recipe is read from the
+    file, and the artifacts are those it used last."""
     file = recipe_file(word)
     there = os.path.isfile(file)
     try:

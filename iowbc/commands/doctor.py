@@ -29,7 +29,7 @@ LEAST_MEMORY = 4e9
 LEAST_DISK = 5e9
 """Disk that a full run and its tracking take [bytes]."""
 PATIENCE = 120.0
-"""Seconds after which a check that runs in a process of its own has failed."""
+"""Time limit of a check that runs in a separate process [s]."""
 
 CONTACT_MODEL = """
 import crocoddyl, numpy, pinocchio
@@ -63,12 +63,12 @@ renderer = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
 context.free()
 print(chosen)
 """
-"""Sets up what a picture without a screen needs."""
+"""Sets up off-screen rendering."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was looked at."""
+    """Result of one check."""
 
     name: str
     verdict: Verdict
@@ -119,7 +119,7 @@ def _python() -> Finding:
 
 
 def _packages() -> Iterator[Finding]:
-    """Installed versions against the ranges that iowbc asks for, those of its extra `train` too."""
+    """Installed versions against the requirements of iowbc and its extra `train`."""
     fitting = []
     for requirement in map(Requirement, importlib.metadata.requires("iowbc") or []):
         if requirement.marker is not None and not requirement.marker.evaluate({"extra": "train"}):

@@ -29,7 +29,7 @@ def export(
     folder: Annotated[Path, typer.Option("--web", help="Output folder of the web page.", metavar="DIR")],
     runs: options.RunsFolder = options.RUNS,
 ) -> None:
-    """Write the page of what a word names into a folder, and say how to look at it. Raises `UsageError`."""
+    """Write the web page of an exported controller, and print how to open it. Raises `UsageError`."""
     options.require_extra("train", "iowbc export")
     store = Store(Runs(runs))
     exported = exported_folder(store, word)

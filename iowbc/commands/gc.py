@@ -1,4 +1,4 @@
-"""`iowbc gc`: removal of what was asked for by name, and of nothing that a process works on."""
+"""`iowbc gc`: removes what its options select, but nothing that a process is using."""
 
 import shutil
 import time
@@ -25,7 +25,7 @@ from iowbc.pipeline.tracking.journal import Journal, sent_path, unsent
 REMOVING = ".removing-"
 """Beginning of the name of a folder that is being removed."""
 DAY = 86_400.0
-"""Seconds."""
+"""Length of a day [s]."""
 PRECIOUS = 3600.0
 """A stage that took longer [s] is removed by its recipe's name alone."""
 
@@ -42,12 +42,11 @@ def gc(
     dry_run: Annotated[bool, typer.Option("--dry-run", help="List the removals without removing anything.")] = False,
     runs: options.RunsFolder = options.RUNS,
 ) -> None:
-    """Remove what the options name, or list it. Raises `UsageError` where they name nothing.
+    """Remove what the options select, or list it. Raises `UsageError` if they select nothing.
 
-    unused: artifacts that no recipe ever used, and remains of processes that died; with `older_than` also those that
-    none used lately. recipes: their records, and artifacts that they used and no other recipe did. work: scratch and
-    checkpoints of stages that did not finish, and journals of their runs that MLflow has. older_than: of all these only
-    what is older [days], and of artifacts in use before what has not been used for as long.
+    unused: artifacts that no recipe ever used, and leftovers of processes that died; with `older_than` also those not
+    used for as long. recipes: their records, and artifacts that only they used. work: scratch files and checkpoints of
+    unfinished stages, and fully sent journals of dead processes. older_than: minimum age of everything removed [days].
     """
     if not (unused or recipes or work or damaged):
         raise UsageError(

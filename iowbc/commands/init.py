@@ -26,7 +26,7 @@ def init(
     links = [str(path) for path in (folder / "robots", folder / "recipes", *origins) if path.is_symlink()]
     if links:
         raise UsageError(f"{', '.join(links)}: a link leads elsewhere; remove it, or name another folder")
-    # what an earlier call that was cut short has copied stays
+    # files copied by an earlier, interrupted call are kept
     same = [target for target, origin in origins.items() if target.exists() and _content(target) == _content(origin)]
     there = [str(target) for target in origins if target.exists() and (target not in same or len(same) == len(origins))]
     if there:

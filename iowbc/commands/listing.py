@@ -60,7 +60,7 @@ def status(as_json: options.AsJson = False, runs: options.RunsFolder = options.R
 
 
 def _print_work(store: Store, console: Console, folder: Path, record: Progress) -> None:
-    """A stage that is being made, or was left unfinished: who works on it, how far it is, and its small curve."""
+    """Print a running or unfinished stage: its process, progress, and curve."""
     who = holder(store.runs, folder.name)
     state = ("runs", "bold yellow") if who else (f"stopped {ago(record.updated)}", "magenta")
     title = f" of {record.recipe} ({folder.name[:KEY_LENGTH]}): "

@@ -1,4 +1,4 @@
-"""Artifacts, recipes and trainings by what a user calls them, and what an artifact was made from."""
+"""Lookup of artifacts, recipes and trainings by name, and of the inputs that an artifact was made from."""
 
 import json
 import os
@@ -73,7 +73,7 @@ def finished_recipes(store: Store) -> list[str]:
 
 
 def nameable(store: Store) -> dict[str, tuple[str, ...]]:
-    """By the name of each recipe that `named` knows, alphabetically: stages that can be named with it."""
+    """Recipes that `named` accepts, alphabetically, with the stages of each that can be named."""
     names = finished_recipes(store)
     return {name: tuple(_recipe(store, name, name, names).usable) for name in names}
 
@@ -144,8 +144,7 @@ def record_comparison(words: Sequence[str], folder: Path) -> None:
 
 
 def points_of(store: Store, words: Sequence[str]) -> list[str]:
-    """Names of recipes, with the finished ones of a sweep, of a study, or of a comparison in place of its
-    name."""
+    """Names of recipes; the name of a sweep, study or comparison is replaced by its finished recipes."""
     recipes = finished_recipes(store)
     found: list[str] = []
     for word in words:
@@ -183,7 +182,7 @@ class InTraining:
     stage: str
     key: str
     text: str
-    """Its state, for the user."""
+    """Message about its state."""
     checkpoint: Path
     ingredients: Mapping[str, Any]
     """The ingredients of its key."""

@@ -24,7 +24,7 @@ EXTRAS = {
 """Modules of the larger packages that each extra of iowbc brings; they come together."""
 HOST = "127.0.0.1"
 PORT = 8080
-"""Port of a page where no other is asked for."""
+"""Default port of a page."""
 LAST_PORT = 65_535
 
 

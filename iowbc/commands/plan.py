@@ -23,7 +23,7 @@ from iowbc.pipeline.store.runs import Runs
 REASONS_SHOWN = 8
 """Reasons of a stage that are printed; the rest is counted."""
 REASON_INDENT = 4
-"""Characters by which reasons stand to the right of their stage."""
+"""Indentation of reasons below their stage [characters]."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ def plan(
     as_json: options.AsJson = False,
     runs: options.RunsFolder = options.RUNS,
 ) -> None:
-    """Print what would run of a recipe or a study, or of a sweep."""
+    """Print the plan of a recipe, a study or a sweep."""
     from iowbc.commands.sweep import plan_sweep
 
     asked = Options(until, frozenset(force or ()), on_code_change=on_code_change)
@@ -62,10 +62,10 @@ def plan(
 
 
 def print_plan(request: Request, console: Console, as_json: bool = False) -> None:
-    """Print what would run, and why; of a study a table of what would run of each recipe."""
+    """Print the stages that would run, and why; for several recipes, as of a study, a table."""
     each = [one for planner in planners(request) for one in in_order(planner)]
     longest: dict[tuple[Path, tuple[str, ...]], Planner] = {}
-    for one in each:  # a recipe may be asked for, and be what another one begins from
+    for one in each:  # a recipe may be both requested and an origin of another one
         known = longest.setdefault((one.loaded.file, one.loaded.overrides), one)
         if len(one.stages) > len(known.stages):
             longest[one.loaded.file, one.loaded.overrides] = one
@@ -80,7 +80,7 @@ def print_plan(request: Request, console: Console, as_json: bool = False) -> Non
 
 
 def planned(planners: Sequence[Planner]) -> Planned:
-    """The stages of each recipe, as things stand: each stage is made once, however many recipes share it."""
+    """The stages of each recipe for the current store; a stage that several recipes share runs once."""
     makers: dict[str, str] = {}
     found: dict[str, list[PlannedStage]] = {}
     for planner in planners:
@@ -95,7 +95,7 @@ def planned(planners: Sequence[Planner]) -> Planned:
 
 
 def _identity(planner: Planner, stage: Stage, before: Mapping[str, str]) -> str:
-    """Stands for a stage's key while those of the stages that it reads are not known."""
+    """Substitute for a stage's key while the keys of its inputs are unknown."""
     ingredients = {
         "stage": stage.name,
         "recipe": stage.key_values(planner.loaded.recipe, planner.deciding),
@@ -107,7 +107,7 @@ def _identity(planner: Planner, stage: Stage, before: Mapping[str, str]) -> str:
 
 
 def _print_several(found: Planned, console: Console) -> None:
-    """A row for each recipe, what the signs mean, and all together."""
+    """Print a row for each recipe, a legend, and the total."""
     console.print(plan_table(found, "recipe"))
     steps = [stage.step for own in found.values() for stage in own if not stage.shared_with]
     rates = sorted({step.rate_of for step in steps if not step.cached and step.roughly is not None})
@@ -121,7 +121,7 @@ def _print_several(found: Planned, console: Console) -> None:
 
 
 def in_all(found: Planned, what: str = "points") -> str:
-    """Amount of work in a sentence; `what`: the recipes' part in it."""
+    """Total work in a sentence; `what`: noun for the recipes."""
     stages = [stage for own in found.values() for stage in own]
     made = [stage.step for stage in stages if not stage.step.cached and not stage.shared_with]
     shared = sum(bool(stage.shared_with) for stage in stages)
@@ -133,7 +133,7 @@ def in_all(found: Planned, what: str = "points") -> str:
 
 
 def time_of(steps: Sequence[StagePlan], manner: str = "") -> str:
-    """The time that stages take together: a range, a guess where one of them has no more, and how many have neither."""
+    """Total time of stages: a range, or a guess if any is only guessed; and the number of unknown ones."""
     known = [step for step in steps if step.guess is not None]
     if not known:
         return "how long that takes is not known"

@@ -1,4 +1,4 @@
-"""`iowbc play`: a policy to watch, to film, or to drive by hand in the browser beside the trials of its evaluation."""
+"""`iowbc play`: shows or films a policy, or serves a page to drive it by hand and to replay its evaluation's trials."""
 
 import contextlib
 import os
@@ -51,7 +51,7 @@ class Planned:
 
     recipe: Recipe | None = None
     artifacts: Mapping[str, Artifact] = field(default_factory=dict)
-    """By stage: the stored ones that it plans to use."""
+    """Stored artifacts that its plan uses, by stage."""
 
 
 def play(
@@ -153,7 +153,7 @@ def skill_to_play(store: Store, word: str, stage: str | None, plan: Planned = Pl
         return None
     if plan.recipe is not None:
         return plan.artifacts.get(SKILL)
-    with contextlib.suppress(UsageError):  # of a first training, of which nothing is finished yet
+    with contextlib.suppress(UsageError):  # a first training has nothing finished yet
         return named(store, word).usable.get(SKILL)
     return None
 
@@ -182,7 +182,7 @@ def _driven(
     """The policy to drive by hand, and the trials of its evaluation."""
     evaluation = None
     if not Path(word).is_dir():
-        with contextlib.suppress(UsageError):  # of a first training, of which nothing is finished yet
+        with contextlib.suppress(UsageError):  # a first training has nothing finished yet
             evaluation = named(store, word).artifacts.get("eval")
     if evaluation is not None and [*named(store, word).artifacts] == ["eval"]:
         played = policy_of(store, evaluation)
@@ -206,11 +206,11 @@ def named_source(
     scene: str | None = None,
     plan: Planned | None = None,
 ) -> "Source":
-    """The source that a word and `--stage` name, with a line on the console while it is trained. Raises `UsageError`,
-    also for a `scene` that its recipe has not. `plan`: of the word, where it is known.
+    """The source that a word and `--stage` denote; prints a line if it is still in training. Raises `UsageError`, also
+    for a `scene` that its recipe lacks. `plan`: the word's plan, if known.
 
-    A recipe's file names the artifacts that `iowbc plan` calls cached; it, or the recipe of a name, says by its own
-    `eval` what is played of them.
+    A recipe file denotes the artifacts that `iowbc plan` reports as cached. The section `eval` of that file, or of the
+    recipe's last run for a name, sets how they are played.
     """
     from iowbc.evaluation.play import Source, asked_by, exported_source
 
@@ -244,8 +244,8 @@ def named_source(
 
 
 def _whole_source(store: Store, artifact: Artifact) -> "Source":
-    """A stored policy, known to be whole, with the world that its own recipe describes and the reference generator that
-    it was trained on. Raises `UsageError` where that is gone or damaged."""
+    """A stored, verified policy with the world of its own recipe and the reference generator that it was trained with.
+    Raises `UsageError` if the generator is missing or damaged."""
     from iowbc.evaluation.play import Source, exported_source
 
     if artifact.manifest.stage == "export":

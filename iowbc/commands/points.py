@@ -23,18 +23,18 @@ from iowbc.pipeline.stop_request import StopRequest
 from iowbc.processes import die_with_parent
 
 POLL = 0.1
-"""Seconds between two looks at the runs."""
+"""Polling interval [s]."""
 PATIENCE = 10.0
 """Seconds that an aborted run has to end by itself."""
 LOG_WIDTH = 160
-"""Characters in a line of a table in a log."""
+"""Width of a log [characters]."""
 Endings = dict[str, RunEnding]
 """Ending of each run by name."""
 
 
 @dataclass(frozen=True)
 class PointRun:
-    """A recipe's run among others."""
+    """One of several runs."""
 
     name: str
     log: Path
@@ -97,7 +97,7 @@ class PointThread(threading.Thread):
     elsewhere."""
 
     def __init__(self, task: PointRun, abort: Callable[[], None]) -> None:
-        """`abort`: lets all that run end at once."""
+        """`abort`: aborts all runs at once."""
         super().__init__(name=task.name)
         self.task, self.abort = task, abort
         self._ending: RunEnding | None = None
@@ -115,12 +115,12 @@ class PointThread(threading.Thread):
         return None if self.is_alive() else self._ending
 
     def stop(self) -> None:
-        """Nothing: the run asks for itself."""
+        """No action: the run polls the stop request itself."""
 
 
 class PointProcess:
-    """A run in a process of its own. It is a copy of this one, which has no other threads: it starts at once, knows the
-    same stages, and hears a signal from its first moment."""
+    """A run in a process forked from this one, which has no other threads. It starts at once, with the same stages and
+    signal handlers."""
 
     def __init__(self, task: PointRun) -> None:
         context = multiprocessing.get_context("fork")
@@ -148,7 +148,7 @@ class PointProcess:
     """The second signal aborts."""
 
     def join(self) -> None:
-        """Return once it has ended; it is killed where it does not end."""
+        """Wait for its end; kill it after `PATIENCE`."""
         self._process.join(PATIENCE)
         if self._process.exitcode is None:
             self._process.kill()
@@ -156,7 +156,7 @@ class PointProcess:
 
 
 def _run(task: PointRun, parent: int, saying: Connection) -> None:
-    os.setpgid(0, 0)  # Ctrl-C reaches the sweep alone, which passes it on once
+    os.setpgid(0, 0)  # Ctrl-C reaches only the sweep, which forwards it once
     die_with_parent(parent)
     log = os.open(task.log, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
     for descriptor in (1, 2):

@@ -19,7 +19,7 @@ from iowbc.pipeline.store.artifact import Artifact
 FOLDED = ("metrics", "finished stages", "used by", "recipe", "point", "why", "found")
 """Columns whose text may go on in the next line."""
 NARROW = 100
-"""Terminals of fewer characters than this leave out what `show` tells."""
+"""Minimum width of a terminal [characters] for the metrics in `ls`; `show` always has them."""
 INTERVAL = 10.0
 """Seconds between two lines about a film, where the output is not a terminal."""
 PIPE_WIDTH = 160
@@ -42,7 +42,7 @@ def plain_table(*columns: str) -> Table:
 
 
 def hanging(line: str, width: int, indent: int) -> str:
-    """A line to the right of its heading, and what of it does not fit two characters further to the right."""
+    """Indent a line; continuation lines are indented by two more characters."""
     first, others = " " * indent, " " * (indent + 2)
     return textwrap.fill(line, width, initial_indent=first, subsequent_indent=others, break_on_hyphens=False)
 
@@ -53,20 +53,20 @@ def tell(console: Console, text: str) -> None:
 
 
 def shown_path(path: Path) -> str:
-    """A path as short as it can be said from here."""
+    """A path relative to the working folder, if it is below it."""
     relative = os.path.relpath(path)
     return relative if not relative.startswith("..") else str(path)
 
 
 def print_json(console: Console, data: Any) -> None:
-    """Print data as JSON; what is no number is null."""
+    """Print data as JSON, with null for NaN and infinity."""
     tell(console, to_json(data, indent=2, inf_nan_mode="null").decode("utf-8"))
 
 
 @contextmanager
 def filming(console: Console, film: Path | None) -> Iterator[Callable[[float, float], None]]:
-    """Progress of a film, called with the time that is drawn and the whole [s]: a bar on a terminal, a line once in a
-    while elsewhere; nothing where there is no film."""
+    """Yields a progress callback for a film, called with the time drawn and the total [s]: a bar on a terminal, lines
+    elsewhere, nothing without a film."""
     if film is None:
         yield lambda seconds, duration: None
         return

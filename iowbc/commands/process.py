@@ -23,11 +23,11 @@ if TYPE_CHECKING:
 DONE, STAGE_FAILED, INTERRUPTED = 0, 1, 130
 """Exit codes."""
 NOT_BEGUN = 256
-"""In place of the exit code, 0 to 255 or a signal below 0, of a run that never began."""
+"""Code of a run that never began; exit codes are 0 to 255, or a negative signal number."""
 IMPORTS = "importlib._bootstrap"
-"""Module whose code is on the stack while a module is being read."""
+"""Module that is on the stack during an import."""
 GONE = (errno.EIO, errno.EPIPE, *FULL)
-"""Errors of a terminal or reader that has gone away, and of a file that takes no more."""
+"""Errors of a closed terminal or pipe, and of a full disk."""
 STANDARD_OUTPUT = 1
 
 
@@ -46,17 +46,16 @@ class RunEnding:
 
 
 def close_on_termination() -> None:
-    """From now on a termination, or a lost terminal, closes what is open, as Ctrl-C does."""
+    """Make SIGTERM and SIGHUP end the command as Ctrl-C does, closing open resources."""
     for number in (signal.SIGTERM, signal.SIGHUP):
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, signal.getsignal(signal.SIGINT))
 
 
 def leave(number: int, frame: FrameType | None) -> None:
-    """End the command: by `SystemExit`, so that what is open is closed.
+    """Signal handler: end the command by `SystemExit`, so that open resources are closed.
 
-    While a module is being read that would reach its caller as an error of that module, if at all; then the process
-    ends at once.
+    During an import, which could swallow or disguise the exception, the process ends at once instead.
     """
     while frame is not None:
         if frame.f_globals.get("__name__") == IMPORTS:
@@ -66,7 +65,7 @@ def leave(number: int, frame: FrameType | None) -> None:
 
 
 def prepare_streams() -> None:
-    """Let every text be written somehow: characters that the terminal does not know, and streams that are closed."""
+    """Make every text printable: replace characters that the terminal lacks, and closed streams by the null device."""
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is None:
@@ -76,7 +75,7 @@ def prepare_streams() -> None:
 
 
 def let_go() -> None:
-    """Drop what the ends of the streams do not take any more, before Python tries to write it once again."""
+    """Discard output that cannot be written any more, before Python tries again at exit."""
     for stream in (sys.stdout, sys.stderr):
         try:
             stream.flush()
@@ -86,7 +85,7 @@ def let_go() -> None:
 
 @contextmanager
 def outlasting_readers() -> Iterator[None]:
-    """Inside, what cannot be written any more is dropped: a lost terminal or a full log file does not end a run."""
+    """Discard output that cannot be written: inside the block, a closed terminal or a full disk does not end a run."""
     former = sys.stdout, sys.stderr
     for stream in former:
         stream.flush()
@@ -108,7 +107,7 @@ def outlasting_readers() -> Iterator[None]:
 
 
 class _Outlasting(io.FileIO):
-    """Leads to nowhere from the first write on that fails because the other end is gone or full."""
+    """File that switches to the null device when a write fails because the reader is gone or the disk is full."""
 
     def write(self, data: "ReadableBuffer", /) -> int:
         try:
@@ -129,8 +128,8 @@ def _lead_to_nowhere(descriptor: int) -> None:
 
 
 def described(error: Exception, arguments: Sequence[str]) -> str:
-    """The message of an unexpected error: one sentence, the place of the details, and the next command. Needs no disk:
-    where the details cannot be written they follow it."""
+    """Message of an unexpected error: a summary, the file with the details, and the next command. If that file cannot
+    be written, the message includes the details."""
     again = f"to go on: {shlex.join(['iowbc', *arguments])}"
     if nothing_fits(error):
         full = what_is_full(error, (Path("runs"), Path(os.environ.get("TMPDIR", "/tmp"))))

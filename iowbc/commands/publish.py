@@ -28,10 +28,10 @@ def publish(
     ] = None,
     runs: options.RunsFolder = options.RUNS,
 ) -> None:
-    """Copy what the recipe's stages have to `runs/published/`, but for the files named in `without`, and verify it.
+    """Copy a recipe's artifacts to `runs/published/`, except for the files in `without`, and verify the copies.
 
-    Raises `UsageError` where a stage has not run, and where no artifact has a file of such a name. Code that changed
-    since an artifact was made is no obstacle, and is said.
+    Raises `UsageError` if a stage has not run, or if no artifact has a file in `without`. Code changes since an
+    artifact was made are reported but accepted.
     """
     request, console = Request(recipe, overrides or (), Runs(runs), Options(until)), stdout_console()
     without = without or []

@@ -33,10 +33,10 @@ class Request:
     verb: str = "run"
     """The command: `run` or `sweep`."""
     further: Sequence[str] = ()
-    """Words of the command line that only `iowbc sweep` knows."""
+    """Additional arguments of `iowbc sweep`."""
 
     def command(self, forced: Sequence[str] = ()) -> str:
-        """The command that goes on with this run; `forced` stages are still to be made anew."""
+        """The command that resumes this run; `forced`: stages that still have to be re-run."""
         words = ["iowbc", self.verb, self.word, *self.further]
         words += [word for override in self.overrides for word in ("--set", override)]
         for one in fields(Options):

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from iowbc.evaluation.side_by_side import Actor
 
 METRICS_SHOWN = 3
-"""Metrics of a stage that are shown at most."""
+"""Maximum number of metrics shown per stage."""
 TABLES = (
     *("lifting", "pushing", "paper", "heavy", "compliance", "impedance", "push_map"),
     *("capacity", "interquartile", "trainings", "probe"),
@@ -80,10 +80,10 @@ def main_tables(folders: Iterable[Path]) -> str:
 
 
 def next_commands(runs: Runs, recipe: str, artifacts: Mapping[str, Artifact]) -> list[str]:
-    """The next commands: to see the robot, where there is a policy, and to read about the run.
+    """Suggested commands: to watch the robot, if there is a policy, and to read about the run.
 
-    What a run with overrides made goes by its key, if they gave it no name of its own: the recipe's name stands for
-    what it has without any.
+    An artifact of a run with overrides is referred to by key unless an override sets the name, because the recipe's
+    name stands for its artifacts without overrides.
     """
     elsewhere = [] if runs.root == Path("runs") else ["--runs", str(runs.root)]
     overrides = recall(runs, recipe).overrides
@@ -123,7 +123,7 @@ def _rank(name: str) -> tuple[int, str]:
 
 
 def tables_of(artifact: Artifact) -> list[Table]:
-    """The tables that an artifact holds; an evaluation that has them as text alone is read again."""
+    """The tables of an artifact; those of an evaluation that has them only as text are recomputed from its trials."""
     found, file = read_tables(artifact.folder / "tables"), artifact.folder / TRIALS
     if found or not file.is_file():
         return found

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from iowbc.twin.robot import Twin
 
 LISTENING = 3.0
-"""For how long the bus is listened to before the checks [s]; the battery's state comes once or twice a second."""
+"""Time of listening to the bus before the checks [s]; the battery's state arrives once or twice per second."""
 POLLING = 5
 """Periods of the bus between two looks for a request of the page."""
 Network = Annotated[str, typer.Option(help="Network interface: lo for this machine, eth0 or another for a robot.")]
@@ -89,7 +89,7 @@ def robot(
         for port in (source, poses):
             if isinstance(port, Udp):
                 stack.callback(port.close)
-        source.wanted(0.0, None)  # what was asked for before the robot was ready
+        source.wanted(0.0, None)  # discard commands from before the robot was ready
         pace = "in step with the simulated robot" if lockstep else prefer_this_process()
         tell(console, f"{pace}; zero torque; commands from {commands}; Ctrl+C damps and ends")
         clock: Clock = LockStep() if lockstep else MonotonicClock()
@@ -215,7 +215,7 @@ def robot_sim(
 
 
 def _show(twin: "Twin", view: "RemoteView") -> None:
-    """Sends the page the picture that it asks for, and applies what its visitor did. Raises EOFError without a page."""
+    """Answer the page's request for a picture and apply user actions. Raises EOFError after the page's end."""
     if (asked := view.asked()) is None:
         return
     simulation, support = twin.simulation, twin.support

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def report_log(console: Console, what: str, log: Path, output: Path) -> None:
-    """Print what happened, replay the log, and draw it. Raises UsageError."""
+    """Replay the log, print its events and errors, and plot it. Raises UsageError."""
     options.require_extra("robot", "iowbc report --log")
     options.require_extra("train", "iowbc report --log")
     if output.suffix != ".png":
@@ -45,7 +45,7 @@ def report_log(console: Console, what: str, log: Path, output: Path) -> None:
 
 
 def _draw(run: "LoggedRun", path: Path) -> None:
-    """Write the figure as PNG: what was commanded, and what the robot did."""
+    """Plot command and measured motion over time as PNG."""
     from matplotlib.figure import Figure
 
     from iowbc.control.command import HEIGHT, PITCH, YAW_RATE

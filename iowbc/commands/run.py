@@ -117,7 +117,7 @@ def _report_of(folder: Path) -> str:
 
 
 def requested_cluster(asked: Options, execution: Execution) -> "AbstractContextManager[Cluster | None]":
-    """The cluster that was asked for, to the end of a block; None where stages run here. Raises `UsageError`."""
+    """Context manager of the requested cluster; it yields None if stages run here. Raises `UsageError`."""
     if (asked.engine or execution.engine) == "local":
         return nullcontext()
     from iowbc.pipeline.cluster.connection import connected
@@ -138,16 +138,16 @@ def run_recipe(
 ) -> RunEnding:
     """Run one recipe.
 
-    within: the run of a sweep to which this one belongs in MLflow. cluster: where stages run, here if empty. errors:
-    where it is said how a run that did not finish goes on; standard error if empty. workers: processes of a stage where
-    neither options nor recipe say how many; as many as there are cores if 0.
+    within: parent run of a sweep in MLflow. cluster: where stages run; None for this machine. errors: console for
+    failures and the command to resume; None for standard error. workers: worker processes of a stage if neither options
+    nor recipe set them; 0: one per core.
     """
     loaded = planner.loaded
     tracker: Tracker | None = None
     runner: Runner | None = None
 
     def rest() -> str:
-        """The command that makes what is missing."""
+        """The command that runs the missing stages."""
         return request.command([name for name in request.options.force if runner is None or name not in runner.made])
 
     status, ending, closing, delivered = "KILLED", RunEnding(INTERRUPTED), "", True

@@ -1,4 +1,4 @@
-"""`iowbc sweep`: a recipe with every combination of some values, several runs at a time, and what came of them."""
+"""`iowbc sweep`: runs a recipe with every combination of given values, and reports the results."""
 
 from collections.abc import Sequence
 from contextlib import nullcontext
@@ -79,9 +79,9 @@ def sweep(
 
 
 def ready(asked: Request, file: Path | None, most: int) -> tuple[Sweep, list[Planner]]:
-    """The points of a sweep, `most` at most, and the planner of each; `file` says what is varied besides.
+    """The points of a sweep, at most `most`, and the planner of each; `file`: YAML file with further variations.
 
-    Raises `RecipeError` for all that is wrong before any runs.
+    Raises `RecipeError` for all problems that can be found before a run.
     """
     if asked.options.force:
         text = "names a stage that points may share; force it in one of them with `iowbc run`"
@@ -107,7 +107,7 @@ def _require_origins(asked: Request, planners: Sequence[Planner]) -> None:
 def plan_sweep(
     asked: Request, file: Path | None, console: Console, as_json: bool = False, most: int = MOST_POINTS
 ) -> None:
-    """Print a row for each point of a sweep with what would run, and all together. Raises `RecipeError`."""
+    """Print the plan of each point of a sweep in a row, and the total. Raises `RecipeError`."""
     sweep, planners = ready(asked, file, most)
     found = planned(planners)
     if as_json:
@@ -126,12 +126,11 @@ def _data(point: Point, own: Sequence[PlannedStage]) -> dict[str, Any]:
 def run_sweep(
     asked: Request, file: Path | None, jobs: int | None, most: int, console: Console, quiet: bool = False
 ) -> int:
-    """Run all points; returns the exit code. Raises `RecipeError`, or `UsageError` where something has to run first.
+    """Run all points; returns the exit code. Raises `RecipeError`, or `UsageError` if another recipe has to run first.
 
-    file, most: see `ready`. jobs: points that run at the same time; if empty one here, on a cluster as many as there
-    are cores.
+    file, most: see `ready`. jobs: points that run in parallel; default 1, on a cluster as many as its cores allow.
 
-    A point that fails does not stop the others. What is stored is used, and what was left unfinished goes on.
+    A failed point does not stop the others. Stored artifacts are used, and unfinished stages are resumed.
     """
     found, planners = ready(asked, file, most)
     _require_origins(asked, planners)
@@ -168,7 +167,7 @@ def run_sweep(
             with board.live or nullcontext():
                 endings = run_points(tasks, jobs, stop, board, start)
     except KeyboardInterrupt:
-        pass  # the endings say so
+        pass  # recorded in the endings
     code = _code(endings)
     try:
         if code != INTERRUPTED:
@@ -182,7 +181,7 @@ def run_sweep(
 
 
 def _shared_out(planners: Sequence[Planner], jobs: int | None, cluster: "Cluster | None") -> tuple[int, int]:
-    """Points that run at the same time, and each one's part of the cores, for those that do not say what they want."""
+    """Points that run in parallel, and default worker processes of each."""
     cores = available_cores() if cluster is None else cluster.cores
     actors = max(one.loaded.recipe.execution.rollout_actors or 1 for one in planners)
     jobs = jobs or (1 if cluster is None else max(1, min(cores // actors, len(planners))))
@@ -219,7 +218,7 @@ def _conclude(
 
 
 def _tell_rest(asked: Request, endings: Endings, folder: Path, code: int) -> None:
-    """Say on standard error what failed, and how to go on."""
+    """Print failures and the command to resume on standard error."""
     said = Console(stderr=True, soft_wrap=True)
     failed = {name: ending.failure for name, ending in endings.items() if ending.state == "failed"}
     if failed:

@@ -18,18 +18,18 @@ from iowbc.results.picture import write_figure
 from iowbc.results.table import Table, heads, markdown, measured
 
 OUTCOMES_SHOWN = 6
-"""Metrics in the table and in the figure at most: those of the last stages."""
+"""Maximum number of metrics in the table and the figure; those of the last stages come first."""
 TABLE, FIGURE, POINTS = "table.md", "parallel.png", "points.csv"
 
 
 @dataclass(frozen=True)
 class Outcomes:
-    """The points that have finished, those that differ in their seed alone in one line."""
+    """Finished points, with those that differ only in their seed in one line."""
 
     settings: tuple[str, ...]
-    """Dotted paths that lines differ in."""
+    """Dotted paths of the varied settings, without seeds."""
     metrics: tuple[str, ...]
-    """`stage metric` of those that are shown."""
+    """Shown metrics, as `stage metric`."""
     lines: tuple[Line, ...]
 
 
@@ -46,7 +46,7 @@ def outcomes(sweep: Sweep, found: Mapping[str, Run]) -> Outcomes:
         own, runs = {path: group[0].settings[path] for path in settings}, [found[point.name] for point in group]
         means, halves = {}, {}
         for name in metrics:
-            # Points that share an artifact measured once.
+            # Points that share an artifact count as one measurement.
             stage = name.partition(" ")[0]
             once = {run.artifacts[stage].manifest.key: _metric(run, name) for run in runs if stage in run.artifacts}
             values = np.array([value for value in once.values() if math.isfinite(value)], np.float64)
@@ -66,8 +66,8 @@ def _metric(run: Run, name: str) -> float:
 
 
 def _chosen(runs: Sequence[Run]) -> tuple[str, ...]:
-    """The telling metrics in which points differ, of the last stages first; of one that is the same for all, those of
-    the last stage."""
+    """Main metrics in which points differ, those of the last stages preferred; if none differs, those of the last
+    stage."""
     known = list(
         dict.fromkeys(
             f"{stage} {name}"

@@ -18,7 +18,7 @@ from iowbc.recipe.execution import Execution
 from iowbc.stages.registry import STAGES
 
 VIEW = "iowbc"
-"""Name under which MLflow keeps how the runs are shown."""
+"""Name of the shared view in MLflow."""
 
 
 def ui(
@@ -45,7 +45,7 @@ def ui(
     command = [sys.executable, "-m", "mlflow", "server", "--host", options.HOST, "--port", str(port), "--workers", "1"]
     command += ["--backend-store-uri", uri, "--artifacts-destination", runs.tracked_files.absolute().as_uri()]
     environment = {**os.environ, "MLFLOW_DISABLE_TELEMETRY": "true", "MLFLOW_SERVER_ENABLE_JOB_EXECUTION": "false"}
-    environment.setdefault("PYTHONWARNINGS", "ignore")  # of MLflow's own code, which a user can do nothing about
+    environment.setdefault("PYTHONWARNINGS", "ignore")  # hides warnings about MLflow's own code
     with subprocess.Popen(command, env=environment) as server:
         try:
             raise typer.Exit(server.wait())

@@ -1,1 +1,1 @@
-"""What runs 50 times a second, in simulation and on the robot alike."""
+"""The control loop, run 50 times a second in simulation and on the robot."""

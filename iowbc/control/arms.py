@@ -14,7 +14,7 @@ X, Y = 0, 1
 def arm_chains(robot: Robot) -> tuple[list[tuple[Body, ...]], tuple[Body, ...]]:
     """Bodies of both arms from the torso outward, and those from the base to the torso.
 
-    The torso is the body that moves: where its own is fixed to another, the frame is the other's.
+    If the torso is fixed to another body, the frame is that of the body that moves.
     """
     torso = robot.tree.mover(robot.torso).name
     return [robot.tree.chain(body, torso) for body in robot.wrist_bodies], robot.tree.chain(torso, robot.base)
@@ -72,8 +72,8 @@ class ArmKinematics(Constants):
 
         `arm_position` (n, arm joints) [rad]; `target` wrist positions (n, 2, 3) [m] in the torso frame; `dt` [s];
         `frames` at `arm_position`, where they are known.
-        next = q + J⁺e + (1 - J⁺J) k (rest - q) dt with J⁺ = Jᵀ(JJᵀ + λ² + ρ|e|)⁻¹ and e = x - FK(q), cut to its
-        longest; kept to the joint ranges and the joint speed.
+        next = q + J⁺e + (1 - J⁺J) k (rest - q) dt with J⁺ = Jᵀ(JJᵀ + λ² + ρ|e|)⁻¹ and e = x - FK(q), limited in
+        length; the result is clipped to joint ranges and joint speed.
         """
         xp, settings, position = namespace(arm_position), self.settings, by_arm(arm_position)
         wrist, columns = self._reached(frames or self._chain.frames(position))
@@ -94,7 +94,7 @@ class ArmKinematics(Constants):
         return arm_position
 
     def into_torso(self, waist: Array, pelvis_pitch: Array, points: Array) -> Array:
-        """Points (n, k, 3) [m] of the heading frame at the base, as the torso frame sees them; the rest as below."""
+        """Points (n, k, 3) [m] of the heading frame at the base, in the torso frame; see `torso_in_heading`."""
         xp, cosine, sine = namespace(points), namespace(points).cos(pelvis_pitch), namespace(points).sin(pelvis_pitch)
         x, y, z = xp.swapaxes(points, 0, 2)
         at_pelvis = stacked([cosine * x - sine * z, y, sine * x + cosine * z])

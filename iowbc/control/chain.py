@@ -1,7 +1,7 @@
 """Chains of hinges, many rows at once: where each hinge is, from the base outward.
 
-Components come first and rows last, so that NumPy's loops are long. Ours, because pinocchio and MuJoCo take one posture
-at a time and are not on the robot's computer, and because the same lines are traced into the exported graph.
+Components come first and rows last, so that NumPy's loops are long. Written here: pinocchio and MuJoCo take one posture
+at a time and are not on the robot's computer, and the same code is traced into the exported graph.
 
 An example: a forearm of 0.3 m that turns about y at the end of an upper arm of 0.2 m that turns about z. With both
 hinges at a quarter turn its end lies 0.3 m below the elbow, which lies 0.2 m to the left of the shoulder:
@@ -64,7 +64,7 @@ class Frames:
     """The hinges of chains from the base outward, in the frame that the chains hang on."""
 
     rotation: Array
-    """Of the bodies that the hinges move, (hinges, 3, 3, chains, n)."""
+    """Rotation of the bodies that the hinges move, (hinges, 3, 3, chains, n)."""
     origin: Array
     """(hinges, 3, chains, n) [m]."""
     axis: Array
@@ -106,7 +106,7 @@ class Chain(Constants):
         return Frames(after, origin, rotated(after, self._axis))
 
     def inward(self, angle: Array, vectors: Array, *, directions: bool = False) -> Array:
-        """Points (3, k, n) [m], or directions, of the frame that the chains hang on, as the last bodies see them;
+        """Points (3, k, n) [m], or directions, of the frame that the chains hang on, in the frames of the last bodies;
         angles as in `frames`."""
         for rotation, offset in zip(self._local(angle), self._offset, strict=True):
             vectors = rotated_back(rotation, vectors if directions else vectors - offset)

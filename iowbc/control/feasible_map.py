@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from iowbc.arrays import Array, Constants
 
 FEASIBLE = "feasible.npz"
-"""File beside a fitted generator: where its postures hold, to which the controller clamps its commands."""
+"""File beside a fitted generator with its feasible map, to which the controller clamps commands."""
 UPRIGHT = 1e-6
-"""Pitch on both sides of an upright torso [rad]; a map has some width."""
+"""Half the width in pitch of the map of an upright torso [rad]; it must not be zero."""
 Run = tuple[int, int]
 """First and last place of a row of feasible heights."""
 
@@ -28,7 +28,7 @@ class FeasibleMap(Constants):
     """Least and greatest height at each pitch, shape (p,) [m]."""
 
     def clamp(self, height: Array, pitch: Array) -> tuple[Array, Array]:
-        """The command brought into the region, first the pitch, then the height at it; shapes (n,) [m], [rad]."""
+        """The command clamped to the region, first the pitch, then the height at that pitch; shapes (n,) [m], [rad]."""
         kept = pitch.clip(self.pitch[0], self.pitch[-1])
         width = self.pitch[1:] - self.pitch[:-1]
         way = (kept[..., None] - self.pitch[:-1]).clip(0.0 * width, width) / width
@@ -79,7 +79,7 @@ class FeasibleMap(Constants):
 def build_map(
     pitches: Array, heights: Array, feasible: NDArray[np.bool_], slope: float, nominal: tuple[float, float]
 ) -> FeasibleMap:
-    """The map of a grid of decisions (pitches, heights), with one run of heights at each pitch.
+    """The map from a grid of feasibility flags (pitches, heights), with one run of heights at each pitch.
 
     It grows from the `nominal` height [m] and pitch [rad] to both sides, each time into the run nearest to the nominal
     height among those that overlap with the one before. Its bounds change with pitch by at most `slope` [m/rad]. Raises

@@ -1,10 +1,10 @@
-"""Foot placement by feedback: feet land further ahead, or behind, as the robot is felt to move faster, or slower, than
-commanded (Raibert's rule; the capture point of a pendulum).
+"""Foot placement by feedback: feet land further ahead when the robot moves faster than commanded, and further behind
+when it is slower (Raibert's rule; the capture point of a pendulum).
 
-The speed is that of the standing leg, or of the one that has stood longer, by joint velocities and gyroscope. While a
-foot swings, its place goes to where it should land; on the ground it comes back under the pelvis as a pendulum's would.
-Both feet trail further behind for as long as the robot stays behind its command, by the integral of the difference: the
-moment of its weight about them is what pushes a crate.
+The speed is that over the standing leg, or the one that has stood longer, from joint velocities and gyroscope. The
+offset of a swinging foot moves to that of its landing; on the ground it decays like that of a pendulum. The integral of
+the speed error moves both feet further behind while the robot is too slow: the moment of its weight about the feet
+pushes a crate.
 """
 
 from dataclasses import dataclass

@@ -8,20 +8,20 @@ from iowbc.recipe.task.joint_references import GaitPrior, Recovery
 from iowbc.robot.mirror import in_place
 
 TINY = 1e-6
-"""Part of a stride within which half a stride counts as complete: float32 rounds a phase by 1e-7."""
+"""Fraction of a stride within which half a stride counts as complete: float32 rounds a phase by 1e-7."""
 phase_mirror = in_place(-1.0, -1.0)
 """Half a stride later: (sin, cos) of the phase change sign, and the zero of standing stays."""
 
 
 def wants_to_move(command: Array, gait: GaitPrior) -> Mask:
-    """Whether the commanded velocity asks for steps; command (n, 11), result (n,)."""
+    """Whether the commanded velocity requires steps; command (n, 11), result (n,)."""
     xp = namespace(command)
     speed = xp.sqrt(command[:, 0] ** 2 + command[:, 1] ** 2)
     return (speed > gait.moving_speed) | (xp.abs(command[:, 2]) > gait.moving_yaw_rate)
 
 
 def is_falling(measured: Measured, pelvis_pitch: Array, recovery: Recovery) -> Mask:
-    """True where the base is felt to tip over; `pelvis_pitch` of the reference posture (n,) [rad], result (n,).
+    """Whether the base is tipping over; `pelvis_pitch` of the reference posture (n,) [rad], result (n,).
 
     Pitch and roll of the measured gravity, less the reference's, and their rates by the gyroscope.
     """
@@ -53,7 +53,7 @@ def advance(phase: Array, stepping: Mask, moving: Mask, gait: GaitPrior, dt: flo
 
 
 def swing_progress(foot_phase: Array, stance: float) -> Array:
-    """How far each foot is through its swing, 0 on the ground and 1 at touch-down; (n, 2) to (n, 2)."""
+    """Progress of each foot through its swing, 0 on the ground and 1 at touch-down; (n, 2) to (n, 2)."""
     return ((foot_phase - stance) / (1.0 - stance)).clip(0.0, 1.0)
 
 
@@ -69,6 +69,6 @@ def expected_stance(foot_phase: Array, stepping: Mask, stance: float) -> Mask:
 
 
 def phase_signal(phase: Array, stepping: Mask) -> Array:
-    """(sin 2πφ, cos 2πφ), shape (n, 2); zero while the clock rests, so that standing is its own value."""
+    """(sin 2πφ, cos 2πφ), shape (n, 2); zero while the clock rests, so that standing has a value of its own."""
     xp, angle = namespace(phase), 2.0 * np.pi * phase
     return xp.stack([xp.sin(angle), xp.cos(angle)], 1) * stepping[:, None]

@@ -105,6 +105,6 @@ def input_names(robot: Robot, height: str) -> tuple[str, ...]:
 
 
 def _rowwise(x: Array, weight: Array) -> Array:
-    """x Wᵀ, (n, in) to (n, out), a product a row: products of whole matrices round otherwise for other numbers of rows,
-    and a robot's reference would depend on how many are computed beside it."""
+    """x Wᵀ, (n, in) to (n, out), one product per row: rounding in a product of whole matrices depends on the number of
+    rows, and a robot's reference would depend on how many are computed with it."""
     return (x[:, None] @ weight.T)[:, 0]

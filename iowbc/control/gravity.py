@@ -33,7 +33,7 @@ class ArmGravity(Constants):
     ) -> Array:
         """Motor torques that hold the arms still, (n, arms) [N·m], in the order of the interaction branch.
 
-        `arms` (n, arms) and `waist` (n, waist joints) positions [rad], measured or referred to; `gravity` (n, 3): its
+        `arms` (n, arms) and `waist` (n, waist joints) positions [rad], measured or reference; `gravity` (n, 3): its
         direction in the base frame, (0, 0, -1) when upright; `load` (n, 2), or (n, 1) where it is the same on both:
         mass that hangs on each grip point [kg]; `frames` of `arms`, where they are known.
 

@@ -1,4 +1,4 @@
-"""Forces on the hands as a robot without force sensors estimates them: from the torques of its arms."""
+"""Estimates of the forces on the hands without force sensors, from the torques of the arms."""
 
 import numpy as np
 
@@ -21,13 +21,13 @@ class HandForces:
         self._count = 0
 
     def add(self, target: Array, position: Array, velocity: Array) -> None:
-        """Takes in a control step: joint targets and measurements, (n, joints) [rad, rad/s]."""
+        """Adds a control step: joint targets and measurements, (n, joints) [rad, rad/s]."""
         self._sum += np.stack([target, position, velocity])
         self._count += 1
 
     def read(self, gravity: Array) -> tuple[Array, Array]:
         """Forces (n, 2, 3) [N] on left and right hand in the heading frame, and wrist positions (n, 2, 3) [m] in the
-        torso frame; then begins anew. `gravity` (n, 3): measured direction in the base frame.
+        torso frame; then restarts the means. `gravity` (n, 3): measured direction in the base frame.
 
         Without acceleration τ = g(q) - Jᵀ F, hence F = (J Jᵀ + λ)⁻¹ J (g - τ) with τ = kp (target - q) - kd q̇.
         """

@@ -1,6 +1,5 @@
-"""Legs that hold up the pelvis: motors give way under robot and load, and the pelvis hangs lower than commanded. Both
-legs stretch by the integral of the difference.
-"""
+"""Height feedback: motors yield under robot and load, and the pelvis sags below its command. Both legs stretch by the
+integral of the error."""
 
 from dataclasses import dataclass
 from typing import Self

@@ -1,6 +1,5 @@
-"""Hips that hold up the torso: the waist's motors give way under a load, and the torso leans further than commanded.
-Both hips turn the pelvis back by the integral of the difference.
-"""
+"""Torso feedback: the waist's motors yield under a load, and the torso leans further than commanded. Both hips turn the
+pelvis back by the integral of the error."""
 
 from dataclasses import dataclass
 from typing import Self

@@ -1,4 +1,4 @@
-"""Rows of named parts: where each lies, how it is mirrored, and how a row is filled."""
+"""Rows of named parts: place, mirror map and computation of each."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -13,7 +13,7 @@ from iowbc.robot.mirror import Kind, MirrorMap, side_by_side
 
 Row = NDArray[np.float32]
 Source = TypeVar("Source")
-"""What the parts of a row are computed from."""
+"""Type of the input from which the parts of a row are computed."""
 EVERY = slice(None)
 """All environments."""
 

@@ -1,4 +1,4 @@
-"""Where the joints of the legs are, with all of them at zero."""
+"""Geometry of the legs with all joints at zero."""
 
 from dataclasses import dataclass
 
@@ -48,7 +48,7 @@ class Legs(Constants):
 
 
 def leg_joints(robot: Robot) -> list[list[int]]:
-    """Places of each leg's joints, as in `AXES`, among the support joints. Raises ValueError for other legs."""
+    """Places of each leg's joints, as in `AXES`, among the support joints. Raises ValueError for other joints."""
     names = [robot.joints[index] for index in robot.support]
     legs = []
     for sole in robot.sole_bodies:
@@ -82,7 +82,7 @@ def leg_geometry(robot: Robot) -> Legs:
 
 
 def _vectors(robot: Robot, sole_body: str, sole: str) -> dict[str, Array]:
-    """Of one leg, by the names of `Legs`, (3,) each; `side`: the sole's centre from the base."""
+    """Vectors of one leg, by the names of `Legs`, (3,) each; `side`: the sole's centre from the base."""
     place, direction = [], []
     position, rotation = np.zeros(3), np.eye(3)
     for body in robot.tree.chain(sole_body, robot.base):

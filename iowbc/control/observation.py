@@ -1,7 +1,7 @@
 """The observation s_t (paper eq. 5): one list of its parts, from which layout, mirror, graph and contract follow.
 
-To add a part, write a function that computes it from `Sensed` and a line of the list. The function is given NumPy
-arrays in simulation and torch tensors while the graph is exported, so it uses operators alone.
+To add a part, write a function that computes it from `Sensed` and add a line to the list. The function receives NumPy
+arrays in simulation and torch tensors in the export of the graph, so it may only use operators.
 """
 
 import math
@@ -19,7 +19,7 @@ from iowbc.robot.mirror import axial_vector, interaction_mirror, joint_mirror, p
 
 @dataclass(frozen=True)
 class Sensed:
-    """What the sensors and the control loop know of n robots; what parts of s_t are computed from."""
+    """Measurements and control state of n robots, from which the parts of s_t are computed."""
 
     measured: Measured
     command: Array
@@ -44,7 +44,7 @@ def joint_deviation(sensed: Sensed) -> Array:
 
 
 def heading_error(sensed: Sensed) -> Array:
-    """How far the base has turned beyond its command, in [-π, π), (n, 1) [rad]; the yaw among the paper's Φ_b."""
+    """Heading of the base less its reference, in [-π, π), (n, 1) [rad]; the yaw among the paper's Φ_b."""
     return (sensed.measured.heading - sensed.heading_reference + math.pi) % (2.0 * math.pi) - math.pi
 
 
@@ -67,7 +67,7 @@ PROPRIOCEPTION: tuple[Part[Sensed], ...] = (
     Part("support_reference", support_mirror, "rad", "joint", attrgetter("support_reference")),
     Part("arm_reference", interaction_mirror, "rad", "joint", attrgetter("arm_reference")),
 )
-"""Parts of s_t without the object, in order. Units are SI; scaling is the business of the learner's normalisation."""
+"""Parts of s_t without the object, in order. Units are SI; the learner's normalisation scales them."""
 OBJECT: tuple[Part[Sensed], ...] = (
     Part("object_position", polar_vector, "m", "base", attrgetter("measured.object_position")),
     Part("object_orientation", axial_vector, "1", "base", object_orientation),

@@ -30,7 +30,7 @@ class LegOdometry(Constants):
         return cls(leg_geometry(robot), places)
 
     def speed(self, measured: Measured) -> Array:
-        """Speed ahead of the base over each foot, were it at rest on the ground, (n, 2) [m/s]."""
+        """Forward speed of the base if the respective foot were at rest on the ground, (n, 2) [m/s]."""
         return -reduce(add, (rate * rise for rate, rise in self._segments(measured)))
 
     def height(self, measured: Measured) -> Array:

@@ -34,7 +34,7 @@ STRETCH, TURN = 3, 4
 
 
 class ReferenceLayer(Constants):
-    """Arm and support references of n environments. Holds constants only; the references are the caller's."""
+    """Arm and support references of n environments. Holds constants only; the caller keeps the references."""
 
     def __init__(self, robot: Robot, references: References, rg: Path | None) -> None:
         """`rg`: folder of the fitted reference generator; without one θ_S_ref is the default posture, and commands are
@@ -161,7 +161,7 @@ class ReferenceLayer(Constants):
     def wrist_target(self, support: Array, command: Array, grasp: Array) -> Array:
         """x_wrist = x_task_base + Δp (eq. 2), turned from the heading frame into the torso frame; (n, 2, 3) [m].
 
-        The torso stands where the references put it, not where it is measured: the arms do not answer to swaying.
+        The torso pose is that of the references, not the measured one, so that the arms do not react to swaying.
         """
         wrists = self.wrists(command, grasp)
         return self.arms.into_torso(support[:, self.waist], self.pelvis_pitch(support, command), wrists)
@@ -174,9 +174,9 @@ class ReferenceLayer(Constants):
     def arm_target(
         self, arms: Array, support: Array, command: Array, load: Array, frames: Frames | None = None
     ) -> Array:
-        """Targets of the arms' joint controllers, (n, arm joints) [rad]: the references and what balances the weight of
-        the arms and of a load (n,) [kg] between the hands, θ + τ / kp, in the posture of the references. `frames` of
-        `arms`, where they are known."""
+        """Targets of the arms' joint controllers, (n, arm joints) [rad]: the references plus offsets that balance the
+        weight of the arms and of a load (n,) [kg] between the hands, θ + τ / kp, in the posture of the references.
+        `frames` of `arms`, where they are known."""
         if self._gravity is None:
             return arms
         xp, pitch = namespace(command), self.pelvis_pitch(support, command)

@@ -1,4 +1,4 @@
-"""What a robot's sensors deliver: the measured inputs of the observation, with their size, unit, frame and mirror."""
+"""Sensor measurements: the measured inputs of the observation, with their size, unit, frame and mirror map."""
 
 from dataclasses import MISSING, dataclass, fields
 from functools import cache
@@ -10,7 +10,7 @@ from iowbc.robot.mirror import Kind, axial_vector, joint_mirror, polar_vector, r
 
 @dataclass(frozen=True)
 class Quantity:
-    """What an array of the control loop means; a row a robot."""
+    """Meaning of an array of the control loop, with one row per robot."""
 
     kind: Kind
     """Its mirror map, whose length is its size."""
@@ -22,7 +22,7 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Measured:
-    """What the robots' sensors deliver, a row for each of n robots."""
+    """Sensor measurements of n robots, one row each."""
 
     projected_gravity: Annotated[
         Array, Quantity(polar_vector, "1", "base", "direction of gravity; (0, 0, -1) when upright")

@@ -1,4 +1,4 @@
-"""Command of the skill layer: an admittance that follows, and how the skill's action departs from a nominal command."""
+"""Command of the skill layer: an admittance to the hand forces, and a nominal command plus the skill's action."""
 
 import numpy as np
 
@@ -12,7 +12,7 @@ class SkillCommand:
     """Commands of n robots, (n, 11)."""
 
     def __init__(self, robot: RobotAgent, commands: Commands, pushing: Mask) -> None:
-        """`pushing`: robots with a crate before them, (n,)."""
+        """`pushing`: robots with a crate in front of them, (n,)."""
         self._robot, self._pushing = robot, pushing
         self._commands = commands
         self._still = np.tile(nominal_command(commands), (len(pushing), 1))
@@ -27,7 +27,7 @@ class SkillCommand:
 
     def following(self, force: Array, object_yaw: Array) -> Array:
         """Commands of an admittance: `force` (n, 3) on both hands [N] and yaw of the object (n,) [rad], heading frame.
-        In a push, forward until the hands meet a force."""
+        In a push it moves forward until the hands meet a force."""
         command, robot = self.standing(), self._robot
         felt = force[:, :YAW_RATE].copy()
         felt[:, 0] += self._pushing * robot.push_force
@@ -51,7 +51,7 @@ class SkillCommand:
         return command
 
     def action_of(self, command: Array, nominal: Array) -> Array:
-        """The action that departs from a nominal command towards another, (n, 11) in [-1, 1]."""
+        """The action that moves a nominal command to another, (n, 11) in [-1, 1]."""
         return ((command - nominal) / self._scale).clip(-1.0, 1.0)
 
 

@@ -9,11 +9,11 @@ from iowbc.control.sensors import Measured
 from iowbc.robot import rotations
 
 FORCE = 50.0
-"""Forces are observed in this unit [N], so that parts are of the size of one."""
+"""Unit of observed forces [N], which makes them of the order of one."""
 TIME = 10.0
-"""The same for times and ways left [s, m]."""
+"""The same for remaining times and distances [s, m]."""
 SENSED = 44
-"""Size of what the robot observes beside the estimated forces."""
+"""Size of the robot's observation without the estimated forces."""
 WAYPOINTS, OBJECT = 9, 10
 """Sizes of the parts of a known path and of the object."""
 YAW = 3

@@ -1,7 +1,7 @@
-"""The control step as one function of arrays: measurements, wanted command, scene and state in, targets and state out.
+"""The control step as one function of arrays: measurements, desired command, scene and state in, targets and state out.
 
-`settle` makes the first state, `step` everything after it. They are what an export traces into `settle.onnx` and
-`step.onnx`; the simulation computes the same equations with its own memory (`iowbc.task.guidance`).
+`settle` computes the first state, `step` all later ones. An export traces them into `settle.onnx` and `step.onnx`; the
+simulation computes the same equations with its own state (`iowbc.task.guidance`).
 """
 
 from collections.abc import Callable, Mapping
@@ -60,7 +60,7 @@ STATE: Mapping[str, tuple[str, str, str]] = {
 
 @dataclass(frozen=True)
 class StepResult:
-    """What a control step finds."""
+    """Result of a control step."""
 
     target: Array
     """Position targets of all joints, MJCF order, (n, joints) [rad]."""
@@ -103,7 +103,7 @@ class ControlStep(Constants):
         """Shape of each part of the state, without the leading axis, in the order of the packed state."""
 
     def settle(self, heading: Array, command: Array, grasp: Array) -> State:
-        """The first state: references settled in the wanted command, clamped; standing, without a past.
+        """The first state: references settled at the desired command, clamped; standing, with an empty history.
 
         `heading` (n, 1) [rad]; `command` C (n, 11); `grasp` (n, 2, 3): base grasp of both wrists, heading frame [m].
         """

@@ -38,7 +38,7 @@ class Stride(Constants):
     upper: Array
     """Ranges of the support joints [rad]."""
     held: float
-    """One if the feedback of height counts while the robot stands, too, else zero."""
+    """One if the height feedback also acts while the robot stands, else zero."""
 
     @classmethod
     def of(cls, robot: Robot, settings: GaitPrior, held: bool = False) -> Self | None:
@@ -95,7 +95,7 @@ class Stride(Constants):
     def _soles(
         self, pitch: Array, ankle_x: Array, command: Array, phase: Array, stepping: Array
     ) -> tuple[Array, Array, Array, Array]:
-        """How far soles are from where the posture has them, (n, 2) each: ahead, to the left, up [m], turned [rad]."""
+        """Displacements of the soles from the posture, (n, 2) each: ahead, to the left, up [m], turned [rad]."""
         xp, gait, legs = namespace(phase), self.settings, self.legs
         foot = foot_phase(phase)
         swing = swing_progress(foot, gait.stance)

@@ -1,4 +1,4 @@
-"""The contract of an exported policy: everything that a caller on the robot must know, as JSON beside the graph."""
+"""Contract of an exported policy: all that a caller on the robot must know, as JSON beside the graph."""
 
 import math
 from collections.abc import Collection, Iterator, Mapping
@@ -24,7 +24,7 @@ from iowbc.robot.description import DESCRIPTION
 
 Kind = TypeVar("Kind", bound=Section)
 LARGEST_CONTRACT = 1_000_000
-"""Bytes of the largest contract that is read."""
+"""Largest contract that is read [bytes]."""
 FORMAT: Literal[4] = 4
 """Format of the contracts that are written and read."""
 GENERATOR_FILES = (WEIGHTS, ARCHITECTURE, FEASIBLE)
@@ -57,18 +57,18 @@ class PartEntry(Section):
 
 
 class Latency(Section):
-    """Ranges of delays that training drew [control periods]."""
+    """Ranges of the delays in training [control periods]."""
 
     action: tuple[float, float]
-    """From the graph's output to the motors."""
+    """Delay from the graph's output to the motors."""
     sensors: tuple[float, float]
-    """Of joints and inertial unit."""
+    """Delay of joint and inertial measurements."""
     object: tuple[float, float]
-    """Of the object's pose."""
+    """Delay of the object's pose."""
 
 
 class Contract(Section):
-    """What `contract.json` says."""
+    """Content of `contract.json`."""
 
     format: Literal[4] = FORMAT
     """Raised when a reader of the old format would misread the new one."""
@@ -85,9 +85,9 @@ class Contract(Section):
     physics_frequency: float = Field(gt=0)
     """Rate of the joints' PD loop in training [Hz]."""
     inputs: tuple[PortEntry, ...]
-    """Of step.onnx."""
+    """Inputs of step.onnx."""
     outputs: tuple[PortEntry, ...]
-    """Of step.onnx."""
+    """Outputs of step.onnx."""
     settle: tuple[str, ...]
     """Inputs of settle.onnx, by their names in `inputs`; its output is `state`."""
     state: tuple[PortEntry, ...]
@@ -127,22 +127,22 @@ class Contract(Section):
     references: References
     """Base grasps, arm kinematics and gait clock."""
     torque: str = TORQUE
-    """How a motor's torque follows from the targets."""
+    """Equation of a motor's torque from the targets."""
     sensing: SensorNoise
     """Noise of the sensors in training, standard deviations."""
     latency: Latency
     """Delays in training."""
     sentences: dict[str, str] = Field(default_factory=dict)
-    """What each entry of this file means, by its dotted path."""
+    """Meaning of each entry of this file, by its dotted path."""
     versions: dict[str, str]
-    """Of the packages that made the graph."""
+    """Versions of the packages that made the graph."""
     sources: dict[str, str]
     """Artifact keys of the stages that went into the graph."""
 
     @model_validator(mode="after")
     def _sizes_and_ports_fit(self) -> Self:
-        """A number for each joint; the inputs that the control loop gives, and the outputs that it uses, whatever else
-        the graph has."""
+        """Checks one number per joint, and the inputs and outputs that the control loop needs among those of the
+        graph."""
         joints = len(self.joints)
         for name in ("kp", "kd", "effort", "velocity_limit", "lower", "upper", "default_position"):
             values = getattr(self, name)
@@ -184,8 +184,8 @@ class Contract(Section):
 
 
 def metadata(contract: Contract) -> dict[str, str]:
-    """What both ONNX files say of themselves: the contract without the digests of files, and its most asked entries
-    under the names that other exporters use."""
+    """Metadata of both ONNX files: the contract without file digests, and its main entries under the names that other
+    exporters use."""
 
     def listed(values: tuple[float, ...]) -> str:
         return ",".join(f"{value:g}" for value in values)
@@ -205,7 +205,7 @@ def metadata(contract: Contract) -> dict[str, str]:
 
 
 def meanings(section: type[Section], path: str = "") -> dict[str, str]:
-    """The sentence below each field of a section, and of the sections in it, by dotted path."""
+    """Attribute docstring of each field of a section, and of its subsections, by dotted path."""
     found = {f"{path}{name}": sentence.replace("\n", " ") for name, sentence in sentences(section).items()}
     for name, about in section.model_fields.items():
         if isinstance(about.annotation, type) and issubclass(about.annotation, Section):
@@ -214,7 +214,7 @@ def meanings(section: type[Section], path: str = "") -> dict[str, str]:
 
 
 def seal(contract: Contract, folder: Path) -> Contract:
-    """Write `contract.json` with the digest of every file that the folder holds now."""
+    """Write `contract.json` with the digest of every file now in the folder."""
     files = sorted(path for path in folder.rglob("*") if path.is_file() and path != folder / CONTRACT)
     sealed = contract.model_copy(update={"files": {str(path.relative_to(folder)): file_digest(path) for path in files}})
     (folder / CONTRACT).write_text(sealed.model_dump_json(indent=1) + "\n", encoding="utf-8")
@@ -223,7 +223,7 @@ def seal(contract: Contract, folder: Path) -> Contract:
 
 @contextmanager
 def readable(part: Path) -> Iterator[None]:
-    """Turn whatever a library says of a file that is not what its name says into `ContractBroken` with the file."""
+    """Turn any error on reading `part` into `ContractBroken` with the file's name."""
     try:
         yield
     except ContractBroken:
@@ -234,14 +234,14 @@ def readable(part: Path) -> Iterator[None]:
 
 
 def require_sealed(files: Collection[str], path: Path, *names: str) -> None:
-    """Raises ContractBroken for files that are to be read and are not among those that the contract at `path` names."""
+    """Raises ContractBroken for `names` without a digest in `files`, those of the contract at `path`."""
     if unsealed := [name for name in names if name not in files]:
         raise ContractBroken(f"{path}: says nothing of {' and '.join(unsealed)}; export again")
 
 
 def generator_folder(contract: Contract, folder: Path) -> Path | None:
-    """The reference generator's folder in an exported one, if it was exported with a generator. Raises ContractBroken
-    for a part of it that the contract has no digest of."""
+    """The reference generator's folder in an exported one; None without a generator. Raises ContractBroken for a part
+    without a digest in the contract."""
     parts = [f"{GENERATOR}/{name}" for name in GENERATOR_FILES]
     if contract.files.keys().isdisjoint(parts):
         return None
@@ -261,14 +261,14 @@ def parsed(kind: type[Kind], path: Path, made_by: str) -> Kind:
     except ValidationError as error:
         wrong = error.errors(include_url=False)
         later = any(one["loc"] == ("format",) and isinstance(n := one["input"], int) and n > known for one in wrong)
-        if later or all(one["type"] == "extra_forbidden" for one in wrong):  # nothing but entries not known yet
+        if later or all(one["type"] == "extra_forbidden" for one in wrong):  # only unknown entries
             text = f"made by a newer version of iowbc than {version('iowbc')}; install that here, or export again"
             raise ContractBroken(f"{path}: {text} with this one: {error}") from error
         raise ContractBroken(f"{path}: not a contract of format {known}: {error}; export again") from error
 
 
 def require_unchanged(files: Mapping[str, str], folder: Path) -> None:
-    """Raises ContractBroken where a folder lacks files with these digests, by their paths in it, or has others."""
+    """Raises ContractBroken for missing or changed files. `files`: digests by path in the folder."""
     missing = [name for name in files if not (folder / name).is_file()]
     if missing:
         raise ContractBroken(f"{folder}: {', '.join(missing)} missing; give the whole folder that was exported")
@@ -281,7 +281,7 @@ def require_unchanged(files: Mapping[str, str], folder: Path) -> None:
 
 
 def read_contract(folder: Path | str) -> Contract:
-    """The contract of an exported folder that is whole and unchanged. Raises ContractBroken."""
+    """Contract of a complete and unchanged exported folder. Raises ContractBroken."""
     folder = Path(folder)
     contract = parsed(Contract, folder / CONTRACT, "export")
     require_sealed(contract.files, folder / CONTRACT, STEP, SETTLE, f"{ROBOT}/{DESCRIPTION}")

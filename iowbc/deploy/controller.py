@@ -25,7 +25,7 @@ from iowbc.errors import ContractBroken
 from iowbc.recipe.task.joint_references import Grasps
 from iowbc.robot.description import Robot, load_robot
 
-onnxruntime.disable_telemetry_events()  # where a process had loaded the library before `iowbc` said so
+onnxruntime.disable_telemetry_events()  # in case the process loaded the library before `iowbc`
 
 Values = dict[str, NDArray[np.float32]]
 
@@ -39,7 +39,7 @@ def open_session(path: Path) -> onnxruntime.InferenceSession:
 
 
 def run(session: onnxruntime.InferenceSession, inputs: Values) -> Values:
-    """Outputs by name; of the inputs those that the graph has."""
+    """Outputs by name; inputs that the graph does not have are ignored."""
     names = [port.name for port in session.get_outputs()]
     found: list[Any] = session.run(names, {port.name: inputs[port.name] for port in session.get_inputs()})
     return dict(zip(names, found, strict=True))
@@ -47,7 +47,7 @@ def run(session: onnxruntime.InferenceSession, inputs: Values) -> Values:
 
 @dataclass(frozen=True)
 class Targets:
-    """What the joints' PD loops are to follow until the next step."""
+    """Targets and gains for the joints' PD loops until the next step."""
 
     position: Array
     """Position targets of all joints, (n, 29) [rad]."""
@@ -62,8 +62,8 @@ class Targets:
     held: Mask
     """Robots whose last good targets are held, (n,)."""
     reasons: tuple[str, ...]
-    """Why each robot's are, "" where they are not: a measurement or command that cannot be true, an old measurement,
-    targets that are no numbers or that jump."""
+    """Reason to hold each robot's, "" if not held: an implausible measurement or command, an old measurement, targets
+    that are not finite or jump."""
 
 
 class Controller:
@@ -104,10 +104,10 @@ class Controller:
 
     @classmethod
     def load(cls, folder: Path | str, robots: int = 1, limits: Limits = WIDE) -> Self:
-        """The controller in an exported folder, or the one that a recipe exported here, by the recipe's name.
+        """The controller in a folder, or the export of the recipe with that name (see `exported_folder`).
 
-        `limits` of measurements that are believed. Raises ContractBroken where the folder is not what its contract
-        says, ValueError for fewer than one robot.
+        `limits`: plausible measurements. Raises ContractBroken if the folder does not match its contract, ValueError
+        for fewer than one robot.
         """
         if robots < 1:
             raise ValueError(f"robots: {robots}, expected 1 or more")
@@ -140,8 +140,8 @@ class Controller:
         return controller
 
     def reset(self, which: Mask | None = None, *, scene: str | None = None) -> None:
-        """Forget the past of the marked robots, a boolean (n,), or of all; `scene` chooses base grasp and expected load
-        ("lift" at first). Raises ValueError for any other mask and for an unknown scene."""
+        """Reset the robots marked in a boolean (n,), or all; `scene` sets base grasp and expected load ("lift" at
+        first). Raises ValueError for any other mask and for an unknown scene."""
         which = np.ones(self.robots, np.bool_) if which is None else np.asarray(which)
         if which.dtype != np.bool_ or which.shape != (self.robots,):
             raise ValueError(
@@ -159,11 +159,11 @@ class Controller:
         time stamps of the measurements, (n,) or one [s], of any clock; without them a measurement is old when its
         values repeat.
 
-        A robot whose measurement or command cannot be true or is old (see `Limits`) stays where it was in its gait and
-        history, and holds its last good targets, as does one whose targets are not finite or jump (see `guard.JUMP`);
-        the others go on: see `Targets.held` and `Targets.reasons`. One that never had good ones holds its joints where
-        they were last measured, or the default posture. Reset a robot that was held for long. Raises ValueError for a
-        shape that does not fit or a missing quantity, and is then as before the call.
+        A robot whose measurement or command is implausible or old (see `Limits`) keeps its gait phase and history, and
+        holds its last good targets. One whose targets are not finite or jump (see `guard.JUMP`) holds them, too; see
+        `Targets.held` and `Targets.reasons`. Without good targets so far it holds its last measured joints, or the
+        default posture. Reset a robot that was held for long. Raises ValueError for a wrong shape or a missing
+        quantity, and then changes nothing.
         """
         given, refusals = self._judged(measured, command, measured_at)
         state = self._state
@@ -187,7 +187,7 @@ class Controller:
         return Targets(passed, self._kp, self._kd, outputs["action"], outputs["support_reference"], held, reasons)
 
     def settled_posture(self, command: Array) -> Array:
-        """Joint positions in which the references begin for a command C, (n, 11) or (11,); (n, joints) [rad]."""
+        """Joint positions at which the references start for a command C, (n, 11) or (11,); (n, joints) [rad]."""
         state = self._settled(self._good | {"command": np.tile(command, (self.robots, 1))[: self.robots]})
         joints = np.zeros((self.robots, len(self.contract.joints)))
         joints[:, self.contract.support] = state[:, self._places["posture"]]
@@ -196,14 +196,13 @@ class Controller:
 
     @property
     def state(self) -> Values:
-        """What the control loop remembers, by the names of the contract's `state`, (n, size) each, to look at."""
+        """Copy of the control loop's state, by the names of the contract's `state`, (n, size) each."""
         return {name: self._state[:, place].copy() for name, place in self._places.items()}
 
     def _judged(
         self, measured: Measured, command: Array, measured_at: Array | float | None
     ) -> tuple[dict[str, Array], dict[int, str]]:
-        """Command and measured inputs of the graph, and why those of some robots were replaced by their last good
-        ones."""
+        """Command and measured inputs of the graph, and by robot the reason for using its last good ones."""
         wanted = np.asarray(command, np.float64)
         values = vars(measured) | {"command": np.tile(wanted, (self.robots, 1)) if wanted.ndim == 1 else wanted}
         given = {}
@@ -239,7 +238,7 @@ def base_grasp(grasps: Grasps, scene: str) -> tuple[float, float, float]:
 
 
 def _require_numbers(path: Path, outputs: Values, said: dict[str, tuple[int, ...]]) -> None:
-    """Raises ContractBroken for a graph whose outputs have other shapes than the contract says, or are no numbers."""
+    """Raises ContractBroken for a graph whose outputs have other shapes than the contract says, or are not finite."""
     made = {name: value.shape[1:] for name, value in outputs.items()}
     if made != said:
         raise ContractBroken(f"{path}: outputs are {made}, the contract says {said}; export again")

@@ -1,4 +1,4 @@
-"""An exported folder: what its files are called, and where it lies; loads no numbers, so that every command may."""
+"""File names and lookup of exported folders; imports no NumPy, so that every command can use it."""
 
 import json
 import os
@@ -9,25 +9,25 @@ from iowbc.errors import ContractBroken
 EXPORT = "export"
 """Stage that writes such folders."""
 SHORTEST_PREFIX = 4
-"""Characters of a key that are enough to name an artifact, where they are unique."""
+"""Least length of a key's prefix that names an artifact, if it is unique."""
 CONTRACT = "contract.json"
 STEP = "step.onnx"
-"""One control step: measurements, wanted command, scene and state to joint targets and the next state."""
+"""One control step: maps measurements, command, scene and state to joint targets and the next state."""
 SETTLE = "settle.onnx"
-"""The first state."""
+"""Initial state."""
 GOLDEN = "golden.npz"
 RECIPE = "recipe.json"
-"""The recipe's world: with it the policy can be played in the simulation that accepted it."""
+"""The recipe's world, for running the policy in the simulation of its acceptance test."""
 ROBOT = "robot"
 """Folder with the robot's description inside the exported folder."""
 GENERATOR = "rg"
-"""Folder with the reference generator, for a simulation of the policy; the controller has all of it in its graphs."""
+"""Folder with the reference generator, for simulations of the policy; the controller's graphs contain it."""
 
 
 def exported_folder(word: Path | str) -> Path:
-    """A folder as it is named, or what the recipe of that name exported into `IOWBC_RUNS`, else `./runs`; where it was
-    not run here, what came with the repository. `RECIPE/export` and the first characters of a key are names, too, as
-    in all commands. Raises ContractBroken where several keys begin like that."""
+    """The folder `word`, or the export of the recipe with that name in `IOWBC_RUNS`, else `./runs`, or the one
+    published with the repository. `RECIPE/export` and a prefix of a key are accepted, too, as in all commands. Raises
+    ContractBroken for an ambiguous prefix."""
     folder, runs = Path(word), Path(os.environ.get("IOWBC_RUNS") or "runs")
     name = str(word).removesuffix(f"/{EXPORT}")
     published = sorted(runs.glob(f"published/{EXPORT}/*"))
@@ -41,7 +41,7 @@ def exported_folder(word: Path | str) -> Path:
 
 
 def _recipe_name(folder: Path) -> str | None:
-    """Name of the recipe that an exported folder was made by, if it can be read."""
+    """Recipe name of an exported folder, if it can be read."""
     try:
         name = json.loads((folder / RECIPE).read_bytes())["name"]
     except (OSError, ValueError, KeyError, TypeError, RecursionError):

@@ -1,4 +1,4 @@
-"""Guard of the joint targets sent to the motors: finite, and without jumps."""
+"""Guard of the joint targets that are sent to the motors: rejects non-finite values and jumps."""
 
 import logging
 from collections.abc import Mapping
@@ -10,19 +10,18 @@ from iowbc.arrays import Array, Mask
 
 LOG = logging.getLogger(__name__)
 JUMP = 2.0
-"""Largest change of a target, as a multiple of the largest motion of its joint in the same time. The target of a PD
-loop sets a torque, too: the largest factor in 96 trials was 1.3, and a factor of 1 was exceeded three times in 79
-minutes of walking."""
+"""Largest change of a target, as a multiple of the joint's velocity limit times the elapsed time. Targets of a PD loop
+also set torques: the largest factor in 96 trials was 1.3, and 1 was exceeded three times in 79 minutes of walking."""
 
 
 class TargetGuard:
     """Holds the last good targets of robots whose new ones are not finite or jump.
 
-    While targets are held, the way that counts as a jump grows with the time, so that a robot is never held for good.
+    The allowed jump grows while targets are held, so that no robot is held forever.
     """
 
     def __init__(self, robots: int, velocity_limit: Array, period: float) -> None:
-        """`velocity_limit` (joints,) [rad/s]; `period` of the control loop [s]."""
+        """`velocity_limit` (joints,) [rad/s]; `period`: control period [s]."""
         self._reach = JUMP * velocity_limit * period
         self._last, self._steps = np.zeros((robots, len(velocity_limit))), np.zeros(robots, np.int64)
         self._reasons = ("",) * robots
@@ -30,10 +29,10 @@ class TargetGuard:
     def passed(
         self, targets: Array, starts: Mask, position: Array, refusals: Mapping[int, str] = MappingProxyType({})
     ) -> tuple[Array, tuple[str, ...]]:
-        """Targets to follow, (n, joints) [rad], and why each robot holds its last ones, "" where it does not.
+        """Targets to follow, (n, joints) [rad], and the reason for each robot to hold its last ones, "" if it does not.
 
-        `starts` (n,): robots that have no last ones yet; they hold the measured `position` (n, joints) instead, if they
-        must. `refusals`: robots that hold theirs whatever the new ones are, and why.
+        `starts` (n,): robots without last targets; if held, they hold the measured `position` (n, joints) instead.
+        `refusals`: reasons of robots that hold theirs in any case.
         """
         last = np.where(starts[:, None], position, self._last)
         finite: Mask = np.asarray(np.isfinite(targets).all(axis=1))

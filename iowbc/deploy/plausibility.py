@@ -1,4 +1,4 @@
-"""Which measurements and commands can be true: units, norms, ranges and age, judged for each robot by itself."""
+"""Plausibility of measurements and commands: units, norms, ranges and age, checked for each robot."""
 
 from dataclasses import fields
 
@@ -35,14 +35,14 @@ class Limits(Section):
     command: float = Field(default=10.0, gt=0.0)
     """Largest entry of a command [m/s, rad/s, m, rad]: more than any robot can do; degrees are more."""
     age: float = Field(default=0.1, gt=0.0)
-    """For how long the same measurement may be given [s]: five steps at 50 Hz; a robot out of balance falls in 0.5."""
+    """Longest time without a new measurement [s]: five steps at 50 Hz; a robot out of balance falls in 0.5."""
 
 
 WIDE = Limits()
 
 
 class Plausibility:
-    """Judges the measurements and commands of n robots; remembers only how old the measurements are."""
+    """Checks the measurements and commands of n robots; its only state is the age of the measurements."""
 
     def __init__(self, contract: Contract, limits: Limits, robots: int) -> None:
         speed = limits.joint_speed * np.array(contract.velocity_limit)
@@ -64,7 +64,7 @@ class Plausibility:
         sizes = {port.name: port.shape[0] for port in contract.inputs}
         entries = {"command": COMMAND, "joint_position": contract.joints, "joint_velocity": contract.joints}
         self.names = ("command", *(field.name for field in fields(Measured) if field.name in sizes))
-        """Names of the values that are judged, in their order."""
+        """Names of the checked values, in order."""
         self._unit_length = [name for name in UNIT_LENGTH if name in sizes]
         low, high = ([np.broadcast_to(ranges[name][end], sizes[name]) for name in self.names] for end in (0, 1))
         self._low, self._high = (
@@ -79,7 +79,7 @@ class Plausibility:
         self._repeated: Array = np.zeros(robots, np.int64)
 
     def refusals(self, given: dict[str, Array], measured_at: Array | None) -> dict[int, str]:
-        """Why the values of a robot cannot be true, for every robot of which that can be said.
+        """Reason by robot, for robots with implausible or old values.
 
         given: the values of `names`, (n, size) each. measured_at: time stamps of the measurements, (n,) [s], of any
         clock; without them equal values are one measurement, as sensors have noise.
@@ -100,7 +100,7 @@ class Plausibility:
         return refusals
 
     def _old(self, measurement: Array) -> Mask:
-        """Robots whose measurement, (n, size), has been the same for too long, (n,)."""
+        """Robots whose measurement, (n, size), has not changed for too long, (n,)."""
         new: Mask = np.ones(len(measurement), np.bool_)
         if measurement.shape == self._last.shape:
             new = (np.isfinite(measurement) & (measurement != self._last)).any(axis=1)

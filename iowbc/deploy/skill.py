@@ -39,11 +39,11 @@ class SkillContract(Section):
     format: Literal[1] = 1
     """Raised when a reader of the old format would misread the new one."""
     frequency: float = Field(gt=0)
-    """Decisions a second [Hz]; a whole part of the controller's frequency."""
+    """Decision rate [Hz]; divides the controller's frequency."""
     observation: int = Field(ge=1)
     """Size of the observation: see `iowbc.control.skill_observation.robot_observation`."""
     sees_object: bool
-    """True where the robot measures the object's pose."""
+    """True if the robot measures the object's pose."""
     robot: RobotAgent
     """Admittance, scales of the action, and length of the history of forces."""
     commands: Commands
@@ -51,7 +51,7 @@ class SkillContract(Section):
     sources: dict[str, str]
     """Artifact keys of the stages that the skill was trained with; `distill` is the controller's student."""
     versions: dict[str, str]
-    """Of the packages that made the graph."""
+    """Versions of the packages that made the graph."""
     files: dict[str, str] = Field(default_factory=dict)
     """SHA-256 of the other files, by name."""
 
@@ -67,7 +67,7 @@ def seal_skill(contract: SkillContract, folder: Path) -> None:
 
 
 def read_skill_contract(folder: Path) -> SkillContract:
-    """The contract of an exported skill that is whole and unchanged. Raises ContractBroken."""
+    """Contract of a complete and unchanged exported skill. Raises ContractBroken."""
     contract = parsed(SkillContract, folder / CONTRACT, "skill")
     require_sealed(contract.files, folder / CONTRACT, *FILES)
     require_unchanged({name: contract.files[name] for name in FILES}, folder)
@@ -75,7 +75,7 @@ def read_skill_contract(folder: Path) -> SkillContract:
 
 
 class Skill:
-    """Commands of the skill layer for the robots of a controller, in games whose goal only the partner knows."""
+    """Commands of the skill layer for a controller's robots, in games whose goal only the partner knows."""
 
     def __init__(
         self,
@@ -99,9 +99,9 @@ class Skill:
 
     @classmethod
     def load(cls, folder: Path | str, controller: Controller, *, scene: str = "lift", pushing: bool = False) -> Self:
-        """The skill in the artifact of the stage `skill`, for the robots of a controller. `scene`: of the base grasp;
-        `pushing`: whether a crate is before the robots. Raises ContractBroken where the folder is not what its contract
-        says or belongs to another controller."""
+        """The skill in the artifact of the stage `skill`, for the robots of a controller. `scene`: selects the base
+        grasp; `pushing`: true with a crate in front of the robots. Raises ContractBroken if the folder does not match
+        its contract or belongs to another controller."""
         folder = Path(folder)
         contract = read_skill_contract(folder)
         both = (contract.sources, controller.contract.sources)
@@ -118,7 +118,7 @@ class Skill:
         return cls(contract, session, controller, scene, pushing)
 
     def reset(self) -> None:
-        """Forget the past of all robots."""
+        """Reset all robots."""
         n = self._controller.robots
         self._felt = np.zeros((n, self.contract.robot.history, 2, 3))
         self._wrist_error = np.zeros((n, 2, 3))
@@ -127,10 +127,9 @@ class Skill:
         self._command = self._rule.standing()
 
     def step(self, measured: Measured) -> Array:
-        """Commands C, (n, 11), for the control period to come; a decision takes effect a period after it, as in
-        training.
+        """Commands C, (n, 11), for the next control period; a decision takes effect one period later, as in training.
 
-        A robot whose measurements are no numbers keeps its command. Raises ValueError for a missing quantity.
+        A robot with non-finite measurements keeps its command. Raises ValueError for a missing quantity.
         """
         if self._yaw is not None:
             action = run(self._session, {"observation": self.observation})["action"]
@@ -146,8 +145,8 @@ class Skill:
         return self._command.copy()
 
     def _sense(self, measured: Measured) -> Array:
-        """Observes for the decision that the step to come makes, so that no step has all of the work; yaw of the
-        objects (n,) [rad]."""
+        """Observes for the decision of the next step, which spreads the work over two steps; yaw of the objects (n,)
+        [rad]."""
         command, thing = self._command, of_object(measured, self.contract.sees_object)
         if self._passed:
             state = self._controller.state

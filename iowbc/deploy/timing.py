@@ -1,4 +1,4 @@
-"""How long a control step takes: arm kinematics, reference generator, history and policy of one robot on one thread."""
+"""Duration of a control step: arm kinematics, reference generator, history and policy of one robot on one thread."""
 
 import itertools
 import time
@@ -19,12 +19,11 @@ INPUT = "input/"
 
 
 def step_seconds(folder: Path | str, steps: int, skill: Path | None = None) -> Array:
-    """Time of control steps along the golden rollout, which is repeated, and the processor's time in them, which other
-    programs do not lengthen, (steps, 2) [s]. The first step of each rollout, which also settles the references, is left
-    out.
+    """Wall time and CPU time of control steps along the repeated golden rollout, (steps, 2) [s]; other programs do not
+    lengthen CPU time. Without the first step of each rollout, which also settles the references.
 
-    folder: as of `Controller.load`; `skill`: folder of a skill that commands the controller, in place of the rollout's
-    commands. Raises ContractBroken where one is not what its contract says.
+    folder: as in `Controller.load`; `skill`: folder of a skill whose commands replace the rollout's. Raises
+    ContractBroken if one does not match its contract.
     """
     controller = Controller.load(folder)
     commanding = None if skill is None else Skill.load(skill, controller)

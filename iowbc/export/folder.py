@@ -1,4 +1,4 @@
-"""The exported folder: the graph, its contract, and all else that a controller loads."""
+"""Exported folder: the graphs, their contract, and all other files that a controller loads."""
 
 import shutil
 from collections.abc import Mapping
@@ -26,7 +26,7 @@ def write_folder(
 ) -> contract.Contract:
     """Write both graphs, `contract.json`, `recipe.json`, the robot's folder, and with `rg` the generator's folder.
 
-    sources: artifact keys of what went into the graph, by stage.
+    sources: artifact keys of the inputs of the graph, by stage.
     """
     robot, drawn = graph.robot, recipe.simulation.randomization
     arrays: dict[str, Any] = {name: tuple(getattr(robot, name).tolist()) for name in ROBOT_FIELDS}
@@ -73,7 +73,7 @@ def write_folder(
 
 
 def world_of(recipe: Recipe) -> Recipe:
-    """The recipe reduced to what the export depends on; all else at its default, but for the commands to play."""
+    """The recipe reduced to what the export depends on and the sequence of the acceptance test; defaults elsewhere."""
     played = recipe.export.acceptance[:1]
     return Recipe(
         name=recipe.name,

@@ -1,4 +1,4 @@
-"""The control step and its first state as torch modules, traced from the equations of `iowbc.control`."""
+"""Control step and initial state as torch modules, traced from the equations of `iowbc.control`."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -32,12 +32,12 @@ class Program(nn.Module):
     outputs: tuple[PortEntry, ...]
 
     def _named(self, values: Sequence[Tensor]) -> dict[str, Any]:
-        """Inputs by name: tensors where the equations' annotations say arrays."""
+        """Inputs by name: tensors where annotations say arrays."""
         return dict(zip((port.name for port in self.inputs), values, strict=True))
 
 
 class SettleProgram(Program):
-    """`settle.onnx`: the first state of a robot."""
+    """`settle.onnx`: the initial state of a robot."""
 
     def __init__(self, equations: ControlStep, command: PortEntry, heading: PortEntry, state: PortEntry) -> None:
         super().__init__()

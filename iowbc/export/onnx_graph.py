@@ -1,4 +1,4 @@
-"""From the torch module to a clean ONNX file."""
+"""Export of a torch module to a clean ONNX file."""
 
 import warnings
 from collections.abc import Mapping
@@ -16,13 +16,13 @@ LEADING_AXIS = "robots"
 def write_onnx(program: Program, path: Path, opset: int, about: Mapping[str, str]) -> None:
     """Write the module with named inputs and outputs and any number of robots as leading axis.
 
-    about: texts kept in the file's metadata. Traces of source files, which the exporter leaves, are removed. The
-    exporter is the one by tracing: the other takes two minutes for the iterations of `settle`.
+    about: texts for the file's metadata. Source locations that the exporter writes are removed. The exporter is the
+    tracing one: the other takes two minutes for the iterations of `settle`.
     """
     ports, names = program.inputs, [port.name for port in program.inputs]
     outputs = [port.name for port in program.outputs]
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the exporter's own: of its successor, and of constants that it folds
+        warnings.simplefilter("ignore")  # deprecation and constant folding
         torch.onnx.export(
             program,
             tuple(torch.zeros(2, *port.shape) for port in ports),  # an example of one row would fix the axis
@@ -45,7 +45,7 @@ def write_onnx(program: Program, path: Path, opset: int, about: Mapping[str, str
 
 
 def _shorten_names(graph: onnx.GraphProto, kept: set[str]) -> None:
-    """Number the values inside, whose names, paths of modules, are a third of the file."""
+    """Replace names of inner values, module paths that are a third of the file, by numbers."""
     numbered: dict[str, str] = {}
 
     def short(name: str) -> str:

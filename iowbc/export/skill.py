@@ -41,7 +41,7 @@ def write_skill(
 ) -> float:
     """Write the skill; returns the largest difference between torch and onnxruntime over the observations (n, size).
 
-    sources: artifact keys of what went into the skill, by stage.
+    sources: artifact keys of the skill's inputs, by stage.
     """
     contract = SkillContract(
         frequency=recipe.skill.frequency,

@@ -1,1 +1,1 @@
-"""The viewer in the browser: a policy that is driven by hand, and recorded trials to look through."""
+"""The browser viewer: a policy driven by hand, and replays of evaluated trials."""

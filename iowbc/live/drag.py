@@ -12,11 +12,11 @@ from iowbc.arrays import Array
 Pushed = Literal["robot", "object"]
 
 STIFFNESS = 150.0
-"""Of the spring between what is dragged and the mouse [N/m]."""
+"""Stiffness of the spring between the dragged point and the pointer [N/m]."""
 STRONGEST = 300.0
 """Force of that spring at most [N]."""
 FARTHEST = 1e3
-"""Points are no farther away than this [m]; what a browser sends beyond is no place."""
+"""Bound on coordinates of points [m]; a browser's values beyond it are invalid."""
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class Drag:
 
     body: str
     start: Array
-    """The point that was taken hold of, where it was when the mouse moved last."""
+    """The dragged point of the body, at the time of the last mouse event."""
     end: Array
     """The pointer, on a plane through that point parallel to the screen."""
     camera: Array
@@ -41,7 +41,7 @@ class Drag:
 
 
 def spring_pulls(drags: Sequence[Drag]) -> dict[Pushed, Array]:
-    """Forces of springs of bounded force between what mice drag and the pointers, world frame, (3,) each [N]."""
+    """Bounded spring forces between dragged points and pointers, summed per body, world frame, (3,) each [N]."""
     pulls: dict[Pushed, Array] = {"robot": np.zeros(3), "object": np.zeros(3)}
     for drag in drags:
         force = STIFFNESS * (drag.end - drag.start)
@@ -51,13 +51,13 @@ def spring_pulls(drags: Sequence[Drag]) -> dict[Pushed, Array]:
 
 
 class Drags:
-    """The drags that are under way, one a browser. A browser that disconnects ends its own."""
+    """Active drags, at most one per browser; it ends when the browser disconnects."""
 
     def __init__(self) -> None:
         self._held: dict[int, Drag] = {}
 
     def now(self, away: Array) -> list[Drag]:
-        """Drags as seen from a view that has moved by `away` (3,) [m] since the world's origin."""
+        """Active drags in world coordinates, for a view displaced by `away` (3,) [m]."""
         return [
             Drag(drag.body, drag.start + away, drag.end + away, drag.camera + away, drag.shift)
             for drag in list(self._held.values())
@@ -69,10 +69,10 @@ class Drags:
             handle.on_drag("left", modifier=modifier)(self.callback(body))
 
     def callback(self, body: str) -> Callable[["viser.SceneNodeDragEvent[Any]"], Coroutine[Any, Any, None]]:
-        """Takes notice of the events of one body. Values that are no places end a drag."""
+        """Event handler for drags of one body. Invalid positions end a drag."""
 
         async def moved(event: "viser.SceneNodeDragEvent[Any]") -> None:
-            """In order, as only asynchronous callbacks are."""
+            """Asynchronous, because only such callbacks run in order."""
             self._held.pop(event.client_id, None)
             places = np.array([event.start_position, event.end_position, event.client.camera.position])
             if event.phase != "end" and (np.abs(places) < FARTHEST).all():

@@ -15,7 +15,7 @@ from iowbc.sim.rendering.forces import ARROW_RADIUS, COLOURS
 
 View = tuple[tuple[float, ...], tuple[float, ...]]
 VIEW: View = ((1.7, -1.4, 1.2), (0.1, 0.0, 0.6))
-"""First position of a camera, and at what it looks [m]."""
+"""Initial position and target of a camera [m]."""
 GHOST = (0.15, 0.45, 0.95)
 GHOST_OPACITY = 0.35
 SUPPORT, BALANCE = (60, 170, 90), (210, 40, 40)
@@ -26,7 +26,7 @@ DOT = 0.025
 FOLLOWING = 0.1
 """Part of the way to the robot that the view follows with each picture."""
 LEFT_BEHIND = 1.0
-"""Farther away than this, it jumps there [m]."""
+"""Distance beyond which the view jumps to the robot [m]."""
 HANDLE, HANDLE_RADIUS = (25, 150, 65), 0.06
 """Colour and radius [m] of the handle that a person takes hold of."""
 LINE = 0.02
@@ -35,7 +35,7 @@ LINE = 0.02
 
 @dataclass(frozen=True)
 class ShownParts:
-    """Parts that are drawn beside the robot and its object."""
+    """Optional parts of the scene, and whether the view follows the robot."""
 
     forces: bool = True
     support: bool = True
@@ -72,7 +72,7 @@ class Drawing:
         scene.set_up_direction("+z")
         scene.configure_default_lights(cast_shadow=True)
         scene.add_grid("/world/ground", infinite_grid=True, cell_size=0.25, section_size=1.0, fade_distance=25.0)
-        # Browsers apply new places at once and new shapes when they find the time: what changes its shape goes along.
+        # Browsers apply poses at once but new shapes late, so shapes are drawn in a frame that moves with the robot.
         self._beneath = scene.add_frame("/world/beneath", show_axes=False)
         self._forces = scene.add_arrows(
             "/world/beneath/forces",
@@ -91,7 +91,7 @@ class Drawing:
         self._balance = scene.add_cylinder("/world/balance", radius=DOT, height=ABOVE_GROUND, color=BALANCE)
 
     def build(self, model: Any, marks: GameMarks | None = None) -> None:
-        """Puts the bodies of a model, and what marks a game, in place of those before."""
+        """Replace the bodies and the marks of a game by those of a model."""
         for handle in [*self._marks, *self._bodies.values(), *self._ghosts.values()]:
             handle.remove()
         self._model = model

@@ -27,14 +27,14 @@ from iowbc.skill.trained import mean_actions
 from iowbc.task.specification import Specification
 
 TIME_LIMIT = 600.0
-"""Time limit of a game [s]: a person looks about first."""
+"""Time limit of a game [s], long because a person first explores the controls."""
 ROBOTS: dict[str, Rule | None] = {"skill": None, "admittance follower": "follow", "stands": "stand"}
 """Robots that a person can compare: the trained skill, and the rule of one without."""
 PATH, WALL = (0.1, 0.35, 0.8, 1.0), (0.55, 0.2, 0.15, 1.0)
 HEIGHT = 0.01
-"""Of lines above the ground [m]."""
+"""Height of lines above the ground [m]."""
 EVERY = 4
-"""Points of a path from one corner of its line to the next: 0.2 m."""
+"""Every how many points of a path its line has a corner: 0.2 m."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The look of an environment at one time: everything that is shown of it, and nothing that simulates."""
+"""Snapshot of an environment for display, independent of the simulation."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -23,7 +23,7 @@ class Moment:
     """One control step, world frame."""
 
     seconds: float
-    """Since the episode began [s]."""
+    """Time since the start of the episode [s]."""
     bodies: Array
     """Position and quaternion (wxyz) of every body of the model, (bodies, 7)."""
     reference: Array
@@ -34,7 +34,7 @@ class Moment:
     support: Array
     """Corners of the convex hull of the soles that touch the ground, in order, (k, 3) [m]; k is 0 in the air."""
     command: Array
-    """In force in the step to come, (11,)."""
+    """Command of the next step, (11,)."""
     signals: Mapping[str, Array]
     """Figures of the step just made, each (k,); in an environment those that a trial records."""
 
@@ -46,7 +46,7 @@ class SimulationRecorder:
         self._simulation = simulation
         self._appearance = Appearance(simulation, 0)
         self.model = self._appearance.model
-        """As it is drawn: with looks, and the object in the size of the present episode."""
+        """Model for drawing: with visual geoms, and the object's size in the current episode."""
         self._world = simulation.world_of(0)[0]
         robot = simulation.robot
         soles = [self.model.body(name).id for name in robot.sole_bodies]

@@ -18,13 +18,13 @@ PICTURES = 1.0 / 25.0
 READING = 0.25
 """Time between two sets of figures [s]."""
 SETTLED = 0.4
-"""A new episode begins when the controls have stood still for so long [s]."""
+"""Time without changes of the controls before a new episode starts [s]."""
 RESTART_DELAY = 2.0
-"""An episode that has ended stays to be seen for so long [s]."""
+"""Time for which an ended episode stays visible [s]."""
 CHECKPOINTS = 2.0
 """Time between two looks for a newer checkpoint [s]."""
 BEHIND = 0.2
-"""A simulation that is further behind its pace lets the time go [s]."""
+"""Maximum delay that a slow simulation tries to catch up [s]."""
 
 
 class Page:
@@ -58,7 +58,7 @@ class Page:
         return [] if self._evaluated is None else trial_titles(self._evaluated.trials)
 
     def run(self, ready: Callable[[], None]) -> None:
-        """Runs until interrupted, and stands still while nobody looks; `ready` is called when the page is complete."""
+        """Run until interrupted, paused while no browser is connected; `ready` is called once the page is complete."""
         self.turn(time.monotonic())
         ready()
         while True:
@@ -69,7 +69,7 @@ class Page:
                 time.sleep(PICTURES)
 
     def turn(self, now: float) -> None:
-        """Heeds the controls, moves on, and draws what is due at a time [s], no earlier than the last."""
+        """Process the controls, advance, and draw if due; `now` [s] must not decrease."""
         if not self._now:
             self._now = self._due = now
         elapsed, self._now = now - self._now, now
@@ -105,7 +105,7 @@ class Page:
             self._cursor = 0.0
 
     def _slide(self, seconds: float) -> None:
-        """Sets the time slider and remembers its value, from which a drag of the slider differs."""
+        """Set the time slider, and store its value to detect a drag by the user."""
         self.panel.time.value = seconds
         self._slid = self.panel.time.value
 
@@ -153,7 +153,7 @@ class Page:
         self.place = self.track.place(self.track.end + (panel.time.value if self.paused else 0.0))
 
     def _begin_anew(self, now: float) -> None:
-        """A new episode where other conditions are asked for, and no longer being changed."""
+        """Start a new episode once the controls request other conditions and are no longer being changed."""
         wish = self.panel.conditions
         if wish != self._wish:
             self._wish, self._wished = wish, now

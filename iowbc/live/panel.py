@@ -1,4 +1,4 @@
-"""Controls and figures beside the scene; the page that runs the simulation reads the controls turn by turn."""
+"""Controls and metrics beside the scene; the page polls the controls once per turn."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -76,7 +76,7 @@ class ControlPanel(ABC):
     @property
     @abstractmethod
     def conditions(self) -> Any:
-        """The episode that is asked for, as `Played.begin` takes it."""
+        """The requested episode, as an argument of `Played.begin`."""
 
     @abstractmethod
     def steer(self) -> None:
@@ -84,7 +84,7 @@ class ControlPanel(ABC):
 
     @abstractmethod
     def press(self, button: Button) -> None:
-        """Carries out what a button of the session's own tabs asks for."""
+        """Carry out the action of a button in the session's own tabs."""
 
     @abstractmethod
     def figures_at(self, track: Track, place: int) -> str:
@@ -99,11 +99,11 @@ class ControlPanel(ABC):
         return ShownParts(**{name: box.value for name, box in self._shown.items()})
 
     def pressed(self) -> list[Button]:
-        """The buttons that were pressed since this was asked last."""
+        """Buttons pressed since the last call."""
         return [self._pressed.get() for _ in range(self._pressed.qsize())]
 
     def label_pause(self, paused: bool) -> None:
-        """Says what the button would do."""
+        """Label the pause button with its next action."""
         self._pause.label = "Go on" if paused else "Pause"
 
 
@@ -165,7 +165,7 @@ class DrivingPanel(ControlPanel):
         self.scene.on_update(lambda _: self._suit_mass())
 
     def _suit_mass(self) -> None:
-        """Lets the mass range over what suits the scene's object."""
+        """Adapt the range of the mass to the scene's object."""
         most = self._heaviest(self.scene.value)
         self.mass.value = min(self.mass.value, most)
         self.mass.max = most

@@ -1,4 +1,4 @@
-"""A simulation in the browser, drawn by a process of its own, for which the simulation never waits."""
+"""Browser view of a simulation, drawn in a separate process that the simulation never waits for."""
 
 import contextlib
 import multiprocessing
@@ -24,7 +24,7 @@ from iowbc.sim.rendering.forces import Force
 from iowbc.sim.simulation import Simulation
 
 NICENESS = 10
-"""Added to that of the page's process: where cores are short, the simulation goes first."""
+"""Niceness added to the page's process, so that the simulation has priority."""
 STARTING = 120.0
 """Time that the page is given to begin before the simulation does [s]."""
 
@@ -50,10 +50,10 @@ class Picture:
 
 
 class RemoteView:
-    """The page of a simulation. It asks for each picture, so that the simulation makes none that nobody draws."""
+    """The page of a simulation. It requests each picture, so that no unused ones are made."""
 
     def __init__(self, simulation: Simulation, port: int) -> None:
-        """Begins to serve at a free port of this machine."""
+        """Start to serve on a port of this machine, which must be free."""
         self._recorder = SimulationRecorder(simulation)
         self._requests, theirs = multiprocessing.Pipe()
         given = theirs, port, simulation.robot, self._recorder.model
@@ -66,14 +66,14 @@ class RemoteView:
         """The page's request, if there is one. Raises EOFError once the page has ended."""
         try:
             return self._requests.recv() if self._requests.poll() else None
-        except ConnectionResetError as error:  # of a page that left an answer unread
+        except ConnectionResetError as error:  # the page ended with an answer unread
             raise EOFError from error
 
     def answer(self, seconds: float, beside: Sequence[Force], status: str, supported: bool) -> None:
-        """Sends the simulation as it is now, `seconds` since its start, with other forces `beside` its own."""
+        """Send the simulation's current state, `seconds` after its start, with additional forces `beside`."""
         moment = self._recorder.look(seconds)
         shown = replace(moment, forces=(*moment.forces, *beside))
-        with contextlib.suppress(BrokenPipeError):  # of a page that has ended, as `asked` finds
+        with contextlib.suppress(BrokenPipeError):  # the page has ended; `asked` will raise
             self._requests.send(Picture(shown, status, supported))
 
     def close(self) -> None:

@@ -22,7 +22,7 @@ LOCAL_NAMES = ("127.0.0.1", "localhost", "::1")
 LARGEST_MESSAGE = 1_000_000
 """Bytes of a message from a browser; those of the viewer have some hundreds."""
 MOST_CONNECTIONS = 32
-"""Open pages: each receives the whole scene, and every change of it."""
+"""Maximum number of open pages; each receives the whole scene and all changes."""
 UNUSED = (
     *(messages.FileTransferStartUpload, messages.FileTransferPart, messages.CommandTriggerMessage),
     *(messages.GuiFormSubmitMessage, messages.GuiFormDirtyMessage),
@@ -53,9 +53,9 @@ def _name(address: str) -> str | None:
 
 @contextmanager
 def own_pages_only() -> Iterator[None]:
-    """Servers that begin within the block answer no request for which there is a `refusal`.
+    """Servers started within the block reject requests with a `refusal`.
 
-    Raises RuntimeError where the viewer's library opened none of its servers the way that is watched.
+    Raises RuntimeError if viser starts its servers in a way that bypasses this check.
     """
     serve, begun = library.serve, []
 
@@ -81,7 +81,7 @@ def own_pages_only() -> Iterator[None]:
 
 
 def check_values(server: viser.ViserServer) -> None:
-    """Let browsers change the values of controls within their ranges, and nothing else."""
+    """Allow browsers only to change values of controls, within their ranges."""
     gui, incoming = server.gui, server._websock_server
 
     async def changed(client: ClientId, message: messages.GuiUpdateMessage) -> None:
@@ -102,8 +102,7 @@ def _leave_out(handler: WebsockMessageHandler) -> None:
 
 
 def within(control: Any, value: Any) -> Any:
-    """The value of a control that comes nearest to one that a browser sends; the present one where it sends another
-    kind of value."""
+    """A browser's value clipped to a control's range; the current value if the type is wrong."""
     now = control.value
     if isinstance(now, bool):
         return value if isinstance(value, bool) else now
@@ -119,7 +118,7 @@ HOST = "127.0.0.1"
 
 
 class LocalServer(viser.ViserServer):  # type: ignore[misc]
-    """A server whose page nobody can pass on."""
+    """A server whose page cannot be shared."""
 
     def request_share_url(self, verbose: bool = True) -> None:
         """Would lead the page through a server of the library's authors."""
@@ -131,9 +130,9 @@ def serving(port: int) -> Iterator[LocalServer]:
 
     Raises UsageError where the port is taken; the library would take the next one.
     """
-    # Browsers open connections ahead and close them unused, which is no error.
+    # Browsers open connections in advance and close them unused, which is not an error.
     logging.getLogger("websockets.server").setLevel(logging.CRITICAL)
-    with redirect_stdout(io.StringIO()), own_pages_only():  # the library prints a frame of its own
+    with redirect_stdout(io.StringIO()), own_pages_only():  # viser prints a banner
         server = LocalServer(host=HOST, port=port, verbose=False, label="iowbc")
     try:
         if port and server.get_port() != port:

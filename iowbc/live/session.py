@@ -18,7 +18,7 @@ from iowbc.live.track import PAST, Played, recorded, track_of
 from iowbc.recipe.evaluation.sequences import Segment
 
 AN_HOUR = (Segment(duration=600.0),) * 6
-"""The longest that an episode lasts."""
+"""Commands for the maximum length of an episode: one hour."""
 PUSH_DURATION = 0.1
 """Length of a push [s]; as long as those of `eval.robustness.pushes`."""
 
@@ -45,7 +45,7 @@ class Session(Played):
 
     def _load(self) -> None:
         self.written = self.source.policy.stat().st_mtime
-        """When the policy was written, as a time stamp; a checkpoint is written again and again."""
+        """Modification time of the policy file; a checkpoint is rewritten during training."""
         if self.source.key:
             self.checkpoint = time.strftime("checkpoint of %H:%M:%S", time.localtime(self.written))
         self._policy = open_policy(self.source, self.environment)
@@ -90,7 +90,7 @@ class Session(Played):
             self.track.moments.append(self._look(self._steps * environment.period))
 
     def push(self, what: Pushed, direction: str, impulse: float) -> None:
-        """A blow over `PUSH_DURATION`, `direction` one of `DIRECTIONS` from the commanded heading, `impulse` [N·s]."""
+        """Push for `PUSH_DURATION`; `direction`: of `DIRECTIONS`, from the commanded heading; `impulse` [N·s]."""
         forward, left = DIRECTIONS[direction]
         heading = float(self.environment.batch.memory.heading_reference[0])
         cosine, sine = np.cos(heading), np.sin(heading)
@@ -100,7 +100,7 @@ class Session(Played):
         self._pushes[what] = (force * along, steps)
 
     def drag(self, drags: Sequence[Drag]) -> None:
-        """Pulls at what mice drag, by a spring of bounded force, and at nothing else."""
+        """Apply the bounded spring forces of mouse drags; bodies without a drag are released."""
         for what, force in spring_pulls(drags).items():
             self.pull(what, force)
 

@@ -12,7 +12,7 @@ from iowbc.arrays import Array
 
 GEOM = mujoco.mjtGeom
 HIDDEN_GROUP = 3
-"""From this group on, geoms are not for the eye, as in MuJoCo's own viewer."""
+"""First group of geoms that is hidden, as in MuJoCo's own viewer."""
 ROUND = 24
 """Segments of a circle."""
 
@@ -36,7 +36,7 @@ def looks(model: Any) -> Iterator[BodyMesh]:
 
 
 def collision_shapes(model: Any, bodies: set[str]) -> Iterator[BodyMesh]:
-    """The primitive shapes of some bodies, by which they touch, whether or not they are for the eye."""
+    """The primitive collision shapes of some bodies, visible or hidden."""
     mesh = GEOM.mjGEOM_MESH.value
     return _merged(
         model, lambda geom: model.geom_type[geom] != mesh and model.body(model.geom_bodyid[geom]).name in bodies

@@ -1,4 +1,4 @@
-"""Episodes of a page, what was taken down of them, and trials of an evaluation that are played again."""
+"""Episodes of a page, their recorded moments, and replays of evaluated trials."""
 
 from abc import ABC, abstractmethod
 from collections import deque
@@ -35,9 +35,9 @@ class TrackFigures:
     """Figures of the seconds before a moment; NaN where there is nothing to measure."""
 
     errors: dict[str, float]
-    """The paper's four, by `ERRORS`, against the command as clamped."""
+    """The paper's four errors, named as in `ERRORS`, relative to the clamped command."""
     weight_in_hands: float
-    """The hands' part of what the robot carries of the object's weight."""
+    """Fraction of the object's weight, as far as the robot carries it, that is in the hands."""
     saturated: dict[str, float]
     """Part of the time at the torque limit, of the joints that ever were."""
 
@@ -48,17 +48,17 @@ class Track:
 
     title: str
     model: Any
-    """As it is drawn."""
+    """Model for drawing."""
     period: float
     """Control period [s]."""
     gait_period: float
-    """Over which v_sys is averaged [s]."""
+    """Averaging window of v_sys [s]."""
     held_weight: float
-    """Of the object in the hands [N]; 0 without one."""
+    """Weight of a held object [N]; 0 without one."""
     joints: tuple[str, ...]
     moments: deque[Moment]
     ending: str = ""
-    """Ending of the episode, once it has ended."""
+    """Reason of the episode's end; empty before it."""
 
     @property
     def start(self) -> float:
@@ -71,7 +71,7 @@ class Track:
         return self.moments[-1].seconds
 
     def place(self, seconds: float) -> int:
-        """Index of the moment at a time [s], or of the nearest one."""
+        """Index of the moment nearest to a time [s]."""
         return int(np.clip(round((seconds - self.start) / self.period), 0, len(self.moments) - 1))
 
     def readings(self, place: int) -> TrackFigures:
@@ -94,7 +94,7 @@ class Played(ABC):
     """Episodes for a page. Close it, or use it as a context manager."""
 
     track: Track
-    """The present episode, with what is remembered of it."""
+    """Record of the current episode."""
     request: Any
     """The conditions of the episode, as `begin` takes them."""
     robot: Robot
@@ -103,9 +103,9 @@ class Played(ABC):
     marks: GameMarks | None = None
     """Path, walls and handle of a game."""
     view = VIEW
-    """First position of a camera, and at what it looks [m]."""
+    """Initial position and target of a camera [m]."""
     checkpoint = ""
-    """Which checkpoint of a training plays."""
+    """Text about the checkpoint in use, if the policy is in training."""
 
     def begin(self, request: Any) -> None:
         """A new episode under other conditions."""
@@ -118,7 +118,7 @@ class Played(ABC):
 
     @abstractmethod
     def reset(self) -> None:
-        """The episode from its start."""
+        """Restart the episode."""
 
     @abstractmethod
     def step(self) -> None:
@@ -126,14 +126,14 @@ class Played(ABC):
 
     @abstractmethod
     def drag(self, drags: Sequence[Drag]) -> None:
-        """Takes notice of what mice drag until the next call."""
+        """Apply mouse drags until the next call."""
 
     @abstractmethod
     def close(self) -> None:
         """Ends the simulation."""
 
     def refresh(self) -> bool:
-        """Takes the newest checkpoint, if the policy is one and was written again; whether it was."""
+        """Reload the policy if it is a checkpoint that was rewritten; returns True if so."""
         return False
 
     def __enter__(self) -> Self:
@@ -162,7 +162,7 @@ def track_of(recorder: MomentRecorder, world: Specification, title: str, kept: i
 
 
 def trial_titles(trials: pd.DataFrame) -> list[str]:
-    """A name for each row of `trials.parquet`: what was tried, and how it ended."""
+    """A title for each row of `trials.parquet`: the trial's conditions and end."""
     return [_title(row) for _, row in trials.iterrows()]
 
 

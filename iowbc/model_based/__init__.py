@@ -1,1 +1,1 @@
-"""The model-based rival: whole-body control by a quadratic program, without anything learnt."""
+"""Model-based baseline: whole-body control by a quadratic program, without a learnt policy."""

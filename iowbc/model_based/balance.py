@@ -20,24 +20,24 @@ from iowbc.reference.labels.support_model import SupportModel
 from iowbc.robot.description import Robot
 
 LIMITS = ("friction", "sole_fraction", "smallest_load", "limit_margin", "effort_fraction")
-"""Physical limits, which the labels of the reference generator have, too."""
+"""Physical limits shared with the labels of the reference generator."""
 WORLD = pinocchio.LOCAL_WORLD_ALIGNED
 
 
 @dataclass(frozen=True)
 class Solution:
-    """Motion that the program plans for the period to come."""
+    """Planned motion of the next control period."""
 
     acceleration: Array
-    """Of base (local frame) and support joints, (21,) [m/s², rad/s²]."""
+    """Acceleration of base (local frame) and support joints, (21,) [m/s², rad/s²]."""
     torque: Array
-    """Of the support joints, (15,) [N·m]."""
+    """Torque of the support joints, (15,) [N·m]."""
     wrench: Array
-    """Of the ground on each sole, sole frames, force then moment, (2, 6) [N, N·m]."""
+    """Wrench of the ground on each sole, sole frames, force then moment, (2, 6) [N, N·m]."""
 
 
 class Balance:
-    """Solves the program of one robot; holds the model and its buffers, and nothing from one call to the next."""
+    """Solves the program of one robot; holds the model and its buffers, but no state between calls."""
 
     def __init__(self, robot: Robot, settings: ModelBased) -> None:
         problem = PostureProblem(**{name: getattr(settings, name) for name in LIMITS})
@@ -57,7 +57,7 @@ class Balance:
         self._selection = np.concatenate([np.eye(self.joints), self._pairs])
 
     def configuration(self, gravity: Array, joints: Array) -> Array:
-        """Of the model, (22,), in a frame that has the base's heading and lies in the middle of the soles.
+        """Model configuration, (22,), in a frame with the base's heading and its origin midway between the soles.
 
         `gravity` (3,): its direction in the base frame; `joints` (15,): support joints [rad].
         """
@@ -71,8 +71,8 @@ class Balance:
         return q
 
     def velocity(self, q: Array, rates: Array) -> Array:
-        """Of the model, (21,), with the soles at rest in the mean. `rates`: of the base (base frame) and of the support
-        joints, (3 + 15,) [rad/s]."""
+        """Model velocity, (21,), with the soles at rest on average. `rates`: of the base (base frame) and of the
+        support joints, (3 + 15,) [rad/s]."""
         v = np.concatenate([np.zeros(3), rates])
         pinocchio.computeJointJacobians(self.model, self.data, q)
         pinocchio.updateFramePlacements(self.model, self.data)
@@ -81,8 +81,8 @@ class Balance:
         return v
 
     def solve(self, q: Array, v: Array, arms: Array, command: Array, reference: Array) -> Solution:
-        """The program at (q, v). `arms` (14,) [rad]; `command`: height [m] and torso pitch [rad], (2,); `reference`:
-        θ_S_ref, (15,) [rad]. Raises `Rejected` where the limits leave no motion."""
+        """Solution at (q, v). `arms` (14,) [rad]; `command`: height [m] and torso pitch [rad], (2,); `reference`:
+        θ_S_ref, (15,) [rad]. Raises `Rejected` if the limits allow no motion."""
         sample, nv = Sample(arms, command), self.velocities
         self.support.lock(sample)
         pinocchio.computeAllTerms(self.model, self.data, q, v)
@@ -103,7 +103,7 @@ class Balance:
         return Solution(found[:nv], torque @ found + bias[6:], found[nv:].reshape(2, 6))
 
     def _equilibrium(self, v: Array, bias: Array) -> tuple[Array, Array]:
-        """Rows and error of what must hold: both soles come to rest, and their wrenches move the base."""
+        """Equality rows and errors: both soles come to rest, and their wrenches move the base."""
         nv = self.velocities
         equality, error = np.zeros((18, nv + 12)), np.empty(18)
         for side, sole in enumerate(self.support.soles):
@@ -144,7 +144,7 @@ class Balance:
     def _limits(self, q: Array, v: Array, torque: Array, bias: Array) -> tuple[Array, Array, Array]:
         """Rows and bounds: torques, also of pairs that share a linkage, joint ranges, and what the soles can carry.
 
-        A joint that rests on its mechanical stop has that beside its motor.
+        At a mechanical stop, the stop's torque adds to the motor's.
         """
         nv, time, support = self.velocities, self.settings.limit_time, self.support
         angle, ahead = q[7:], q[7:] + time * v[6:]

@@ -1,4 +1,4 @@
-"""Motion of the robots from noisy angles and rates: a steady-state Kalman filter around the planned accelerations."""
+"""Motion estimate from noisy angles and rates: a steady-state Kalman filter around the planned accelerations."""
 
 import numpy as np
 from scipy.linalg import solve_discrete_are
@@ -12,10 +12,10 @@ TILT = slice(0, 3)
 
 
 def filter_gains(period: float, settings: Estimation, angle: float, rate: float) -> Array:
-    """Gains of the filter: from a surprise in angle and rate to angle, rate and unplanned acceleration, (3, 2).
+    """Kalman gains: from the innovation of angle and rate to angle, rate and unplanned acceleration, (3, 2).
 
-    `angle` [rad] and `rate` [rad/s]: standard deviations of what is measured. The model over a period T is
-    x⁺ = [[1, T, T²/2], [0, 1, T], [0, 0, 1]] x + [T²/2, T, 0] · planned acceleration.
+    `angle` [rad] and `rate` [rad/s]: standard deviations of the measurements. The model over a period T is x⁺ = [[1, T,
+    T²/2], [0, 1, T], [0, 0, 1]] x + [T²/2, T, 0] · planned acceleration.
     """
     step = np.array([[1.0, period, 0.5 * period**2], [0.0, 1.0, period], [0.0, 0.0, 1.0]])
     seen = np.eye(2, 3)
@@ -38,13 +38,13 @@ class MotionFilter:
         self.rates, self.unplanned = np.zeros((n, 3 + joints)), np.zeros((n, 3 + joints))
 
     def begin(self, index: int, gravity: Array, joints: Array) -> None:
-        """Forgets the past of a robot, which stands still."""
+        """Resets a robot, at rest."""
         self.gravity[index], self.joints[index] = gravity, joints
         self.rates[index], self.unplanned[index] = 0.0, 0.0
 
     def correct(self, index: int, gravity: Array, joints: Array, rates: Array) -> None:
-        """Takes in measurements: gravity in the base frame (3,), joints (k,) [rad], and rates of the base (base frame)
-        and of the joints (3 + k,) [rad/s]."""
+        """Updates with measurements: gravity in the base frame (3,), joints (k,) [rad], and rates of the base (base
+        frame) and of the joints (3 + k,) [rad/s]."""
         turned = np.cross(gravity, self.gravity[index])
         surprise = np.stack([np.concatenate([turned, joints - self.joints[index]]), rates - self.rates[index]], axis=1)
         angle, rate, unplanned = np.einsum("kij,kj->ik", self._gains, surprise)
@@ -53,7 +53,7 @@ class MotionFilter:
         self.unplanned[index] += unplanned
 
     def advance(self, index: int, planned: Array) -> None:
-        """Goes on by a control period with planned accelerations, (3 + k,) [rad/s²]."""
+        """Predicts one control period with planned accelerations, (3 + k,) [rad/s²]."""
         change = self._period * (planned + self.unplanned[index])
         self._turn(index, self._period * (self.rates[index] + 0.5 * change))
         self.rates[index] += change

@@ -1,4 +1,4 @@
-"""The quadratic program as a policy: joint targets from the same observation that the student sees."""
+"""The quadratic program as a policy: joint targets from the observation of the student."""
 
 import numpy as np
 import pinocchio
@@ -16,10 +16,10 @@ from iowbc.robot.description import Robot
 
 
 class ModelPolicy:
-    """Acts in n environments, each on its own; remembers their motion.
+    """Acts in n environments independently, with a motion estimate for each.
 
-    With q the joints, τ the program's torques and v⁺ the joint velocities that it plans, the target of the joint
-    controllers is q + (τ + kd v⁺) / kp, so that they give τ where the robot moves as planned.
+    With q the joints (extrapolated by `lead`), τ the program's torques and v⁺ the planned joint velocities, the target
+    of the joint controllers is q + (τ + kd v⁺) / kp, so that they apply τ if the robot moves as planned.
     """
 
     def __init__(self, robot: Robot, recipe: Recipe) -> None:
@@ -32,14 +32,14 @@ class ModelPolicy:
         self._starts = np.ones(0, np.bool_)
 
     def reset(self, which: NDArray[np.bool_]) -> None:
-        """Forget the past of the marked environments, shape (n,)."""
+        """Reset the marked environments, shape (n,)."""
         if self._starts.shape != which.shape:
             self._starts = np.ones(which.shape, np.bool_)
             self._motion = self._filter(len(which))
         self._starts |= which
 
     def act(self, observation: NDArray[np.float32], privileged: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Residual action, shape (n, A), from s_t, shape (n, S). Rows of zeros, which no trial fills, stay zero."""
+        """Residual action, shape (n, A), from s_t, shape (n, S). Rows of zeros, which belong to no trial, stay zero."""
         del privileged
         rows = observation.astype(np.float64)
         action = np.zeros((len(rows), len(self._scale)))
@@ -48,7 +48,7 @@ class ModelPolicy:
         return action.astype(np.float32)
 
     def _act(self, index: int, row: Array) -> Array:
-        """The action of one environment; that of the step before where the program has no solution."""
+        """Action of one environment; the previous one if the program has no solution."""
         robot, balance, motion = self._robot, self._balance, self._motion
         seen = {name: row[place] for name, place in self._places.items()}
         reference, gravity = seen["support_reference"], seen["projected_gravity"]

@@ -1,4 +1,4 @@
-"""Limits of a robot on its bus, the checks before it moves, and the reasons to damp it while it moves."""
+"""Safety limits, checks before the robot moves, and reasons to damp it while it moves."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,14 +19,14 @@ class SafetyLimits(Section):
     """Limits of checks and watchdogs."""
 
     state_age: float = Field(default=0.015, gt=0.0)
-    """Age of the newest state at which it is stale [s]: seven lost messages at 500 Hz, and with a period of the loop
-    damping begins within 20 ms of the last one."""
+    """Age of the newest state at which it is stale [s]: seven lost messages at 500 Hz; with the loop's period, damping
+    begins within 20 ms of the last state."""
     command_age: float = Field(default=0.5, gt=0.0)
     """Age of the newest command at which it is stale [s]; the robot covers 0.3 m in it at full speed."""
     object_age: float = Field(default=0.1, gt=0.0)
     """Age of the newest object pose at which it is stale [s]: five control periods."""
     overrun: float = Field(default=0.01, gt=0.0)
-    """Longest time between two turns of the loop [s]: five periods, half a control period."""
+    """Longest time between two cycles of the loop [s]: five periods, half a control period."""
     tilt: float = Field(default=1.0, gt=0.0)
     """Largest angle between pelvis and vertical [rad]; deep bows lean by 0.6, and beyond 1 it falls."""
     position_margin: float = Field(default=0.1, ge=0.0)
@@ -36,13 +36,13 @@ class SafetyLimits(Section):
     torque: float = Field(default=1.2, gt=0.0)
     """Highest estimated torque as a multiple of the motor's limit: saturation is allowed, the estimate has errors."""
     battery: float = Field(default=20.0, ge=0.0, le=100.0)
-    """Least charge to begin with, below which a moving robot warns [%]."""
+    """Least charge at the start; below it, a moving robot warns [%]."""
     battery_empty: float = Field(default=10.0, ge=0.0, le=100.0)
-    """Least charge to move with [%]; an assumption, for the charge at which the robot turns off is not public."""
+    """Least charge of a moving robot [%]; an assumption, since the charge at which it turns off is not public."""
     temperature: float = Field(default=80.0, gt=0.0)
-    """Highest motor temperature to begin with, above which a moving robot warns [°C]."""
+    """Highest motor temperature at the start; above it, a moving robot warns [°C]."""
     temperature_hot: float = Field(default=100.0, gt=0.0)
-    """Highest motor temperature to move with [°C]; an assumption, for the drives' own limit is not public."""
+    """Highest motor temperature of a moving robot [°C]; an assumption, since the drives' own limit is not public."""
     standing_tilt: float = Field(default=0.35, gt=0.0)
     """Largest angle between pelvis and vertical at which Stand and Run begin [rad]."""
     standing_speed: float = Field(default=3.0, gt=0.0)
@@ -63,14 +63,14 @@ MODEL = 5
 PITCH_ROLL = 0
 """`mode_pr` in which ankles and waist are commanded by pitch and roll, not by their motors' angles."""
 DRY_STEPS = 5
-"""Steps of the policy on the measured posture; none is sent."""
+"""Policy steps of the dry run on the measured posture; their targets are not sent."""
 FURTHEST = 1.0
-"""Largest distance of a dry step's target from the default posture that is believed [rad]."""
+"""Largest plausible distance of a dry-run target from the default posture [rad]."""
 
 
 @dataclass(frozen=True)
 class CheckResult:
-    """One check and how it ended."""
+    """One check and its result."""
 
     name: str
     passed: bool
@@ -79,19 +79,19 @@ class CheckResult:
 
 @dataclass(frozen=True)
 class Listened:
-    """Messages on the bus while the robot was listened to."""
+    """Messages received while listening to the bus before the robot moves."""
 
     states: Sequence[Record]
     seconds: float
     battery: Record | None
     others: int
-    """Low-level commands of other programs."""
+    """Number of low-level commands from other programs."""
     mode: str | None
-    """Active controller of the robot's own, "" for none, None without an answer."""
+    """The robot's active built-in controller: "" for none, None without an answer."""
 
 
 def checks(controller: Controller, heard: Listened, wanted: Array, limits: SafetyLimits) -> list[CheckResult]:
-    """All checks, in the order in which they are worth reading; `wanted`: the command to stand, (11,)."""
+    """All checks, most important first; `wanted`: the command to stand, (11,)."""
     contract = controller.contract
     if not heard.states:
         text = f"no rt/lowstate in {heard.seconds:g} s: is the robot on, is the network right?"
@@ -122,7 +122,7 @@ def checks(controller: Controller, heard: Listened, wanted: Array, limits: Safet
 
 
 def _dry_run(controller: Controller, sensors: Sensors, wanted: Array) -> CheckResult:
-    """Steps of the policy on the posture as measured, of which no command is sent."""
+    """Dry run: policy steps on the measured posture; no command is sent."""
     if not quantities(of_object=True).keys().isdisjoint(port.name for port in controller.contract.inputs):
         return CheckResult("policy", True, "observes the object: tried when its pose arrives")
     controller.reset()
@@ -142,7 +142,7 @@ def _dry_run(controller: Controller, sensors: Sensors, wanted: Array) -> CheckRe
 
 
 def stale(sensors: Sensors, now: float, limits: SafetyLimits) -> str | None:
-    """The reason where the newest state is old, or arrives late by the robot's own clock."""
+    """Reason if the newest state is old, or arrives late by the robot's own clock."""
     age = now - sensors.at
     if age > limits.state_age:
         return f"stale state: nothing new for {1e3 * age:.0f} ms"
@@ -152,7 +152,7 @@ def stale(sensors: Sensors, now: float, limits: SafetyLimits) -> str | None:
 
 
 def beyond(now: MeasuredState, contract: Contract, limits: SafetyLimits) -> str | None:
-    """The reason where a measurement is no number or beyond a limit."""
+    """Reason if a measurement is not finite or beyond a limit."""
     measured = np.concatenate([now.position, now.velocity, now.torque, now.gravity, now.turning])
     if not np.isfinite(measured).all():
         return "a measurement is not finite"
@@ -174,7 +174,7 @@ def beyond(now: MeasuredState, contract: Contract, limits: SafetyLimits) -> str 
 def exhausted(
     now: MeasuredState, charge: float | None, joints: tuple[str, ...], least: float, most: float
 ) -> dict[str, str]:
-    """Complaints about a battery below `least` and a motor above `most` [°C]; `charge`: None where unknown [%]."""
+    """Messages about a battery below `least` [%] and a motor above `most` [°C]; `charge`: None if unknown [%]."""
     found = {}
     if charge is not None and charge < least:
         found["battery"] = f"battery at {charge:.0f} %, less than {least:g}"

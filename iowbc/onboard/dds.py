@@ -1,4 +1,4 @@
-"""The G1's bus over Cyclone DDS. Messages go to the wire as the bytes of their records; no object is made of them."""
+"""The G1's bus over Cyclone DDS. Records are sent as raw bytes, without intermediate objects."""
 
 import json
 import time
@@ -29,9 +29,9 @@ TOPICS = {
 SWITCHER = "rt/api/motion_switcher/"
 """Service of the robot that starts and stops its own controllers."""
 CHECK_MODE = 1001
-"""Its call that returns the active controller as `{"name": ...}`."""
+"""Request of that service that returns the active controller as `{"name": ...}`."""
 KEPT = 64
-"""Messages that wait to be taken: an eighth of a second at 500 Hz."""
+"""Length of the receive queue [messages]: an eighth of a second at 500 Hz."""
 NUMBERS = {"u1": uint8, "u2": uint16, "u4": uint32, "i2": int16, "i4": int32, "f4": float32}
 LOOPBACK = """<General><AllowMulticast>false</AllowMulticast></General>
 <Discovery><ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>
@@ -56,7 +56,7 @@ def _idl_type(kind: np.dtype[np.void]) -> Any:
 
 
 def _topic_type(kind: np.dtype[np.void]) -> Any:
-    """The same, of which a sample holds the bytes of CDR as `data`."""
+    """The type with samples that hold CDR bytes as `data`."""
     made = _idl_type(kind)
     made.serialize = lambda sample, **_: sample.data
     made.deserialize = classmethod(_sample)
@@ -82,7 +82,7 @@ Response_ = _struct(f"{API}.Response_", header=ResponseHeader_, data=str, binary
 
 @cache
 def _configured(domain: int, configuration: str) -> Domain:
-    """The domain, which a process can configure once and which has to live as long as its participants."""
+    """The domain; a process can configure it only once, and it must outlive its participants."""
     return Domain(domain, configuration)
 
 
@@ -90,7 +90,7 @@ class DdsBus:
     """A participant of the bus; see `iowbc.onboard.process.Bus`."""
 
     def __init__(self, network: str, domain: int = 0) -> None:
-        """`network`: interface, as `lo` or `eth0`. Raises UsageError for one that Cyclone DDS cannot use."""
+        """`network`: interface such as `lo` or `eth0`. Raises UsageError if Cyclone DDS cannot use it."""
         extra = LOOPBACK if network == "lo" else ""
         interface = f'<General><Interfaces><NetworkInterface name="{network}"/></Interfaces></General>'
         try:
@@ -142,7 +142,7 @@ class DdsBus:
         return None
 
     def answer_mode_requests(self) -> None:
-        """Answers, as a robot would, that no controller of its own is active; to be called every now and then."""
+        """Answers mode requests as a robot without an active controller does; call it regularly."""
         if Request_ not in self._readers:
             self._readers[Request_] = self._listening(Topic(self._participant, f"{SWITCHER}request", Request_))
             topic = Topic(self._participant, f"{SWITCHER}response", Response_)

@@ -1,7 +1,7 @@
-"""The paper's errors of a logged run, as far as the robot's own sensors tell them.
+"""The paper's tracking errors of a logged run, as far as onboard sensors allow.
 
-Height and velocity come from the legs' kinematics: the lower sole is taken to stand still. The velocity is that of the
-pelvis, not v_sys, for nobody measures the object.
+Height and velocity come from the legs' kinematics and assume that the lower sole stands still. The velocity is the
+pelvis's, not v_sys, since the object is not measured.
 """
 
 from dataclasses import dataclass
@@ -21,23 +21,23 @@ from iowbc.robot.description import Robot
 
 @dataclass(frozen=True)
 class LoggedRun:
-    """Motion of a robot in Run, at the rate of the policy; first axis: T control steps."""
+    """Motion of a robot with full position gains, at the rate of the policy; first axis: T control steps."""
 
     time: Array
-    """From the log's beginning, (T,) [s]."""
+    """Time since the log's beginning, (T,) [s]."""
     command: Array
-    """C as it was asked for, (T, 11)."""
+    """Requested command C, (T, 11)."""
     height: Array
-    """Of the pelvis above the lower sole, (T,) [m]."""
+    """Height of the pelvis above the lower sole, (T,) [m]."""
     pitch: Array
     """Lean of the torso, (T,) [rad]."""
     heading: Array
     """(T,) [rad]."""
     velocity: Array
-    """Of the pelvis in the heading frame, averaged over a gait period, (T, 2) [m/s]."""
+    """Velocity of the pelvis in the heading frame, averaged over a gait period, (T, 2) [m/s]."""
 
     def deviations(self) -> dict[str, Array]:
-        """Deviation from the command as given, by the error's name, (T,) each."""
+        """Deviation from the requested command, by the error's name, (T,) each."""
         period = np.diff(self.time, prepend=self.time[0])
         wanted = self.heading[0] + np.cumsum(self.command[:, YAW_RATE] * period)
         return {
@@ -52,7 +52,8 @@ UNITS = {"E_v": "m/s", "E_ψ": "rad", "E_α": "rad", "E_h": "m"}
 
 
 def read_run(path: Path, robot: Robot, control_frequency: float, gait_frequency: float) -> LoggedRun:
-    """The part of a log in which the policy acted. Raises UsageError where it never did, Damaged for another file."""
+    """Part of a log with full position gains (Run, settled Stand). Raises UsageError without one, Damaged for another
+    file."""
     sensors, every = Sensors(len(robot.joints)), round(FREQUENCY / control_frequency)
     full, rows, soles, begin = 0.99 * robot.kp, [], [], None
     for number, (given, command) in enumerate(read_turns(path)):

@@ -1,6 +1,6 @@
-"""The log of a robot: every message and every input of the state machine, in the MCAP format; and its replay.
+"""Log of a robot: all messages and inputs of the state machine, in the MCAP format; and its replay.
 
-Messages of one turn of the loop have one time. `inputs` begins a turn, and the low-level command ends it.
+All messages of a cycle of the loop share a time stamp: first `inputs`, last the low-level command.
 """
 
 import json
@@ -24,14 +24,14 @@ from iowbc.onboard.messages import Record, from_cdr, to_cdr
 TOPICS = {messages.LOW_STATE: "rt/lowstate", messages.LOW_COMMAND: "rt/lowcmd"}
 JSON_TOPICS = ("inputs", "event", "timing")
 ABOUT = "iowbc"
-"""Name of the metadata with which the robot's program can be set up again."""
+"""Name of the metadata that a replay needs."""
 
 
 class LogWriter:
-    """Writes a log in a thread of its own, so that no disk holds up the loop."""
+    """Writes a log in its own thread, so that a slow disk does not delay the loop."""
 
     def __init__(self, path: Path, about: dict[str, str]) -> None:
-        """`about`: what is needed to replay the log. Raises UsageError where the file cannot be written."""
+        """`about`: metadata for the replay. Raises UsageError if the file cannot be written."""
         try:
             self._file = path.open("xb")
         except OSError as error:
@@ -90,7 +90,7 @@ class LogWriter:
 
 
 def read_about(path: Path) -> dict[str, str]:
-    """Header of the log, by the program that wrote it. Raises Damaged."""
+    """Metadata of a log of `iowbc robot`. Raises Damaged."""
     with path.open("rb") as file:
         try:
             about = [entry.metadata for entry in NonSeekingReader(file).iter_metadata() if entry.name == ABOUT]
@@ -102,7 +102,7 @@ def read_about(path: Path) -> dict[str, str]:
 
 
 def read_messages(path: Path) -> Iterator[tuple[str, float, bytes]]:
-    """Topic, time [s] and data of every message, as written; a file that was cut is read as far as it goes.
+    """Topic, time [s] and data of every message, as written; a truncated file is read up to the cut.
 
     Raises UsageError for a missing file, Damaged for one without a message.
     """
@@ -116,13 +116,13 @@ def read_messages(path: Path) -> Iterator[tuple[str, float, bytes]]:
             for _, channel, message in NonSeekingReader(file).iter_messages(log_time_order=False):
                 found = True
                 yield channel.topic, 1e-9 * message.log_time, message.data
-        except Exception as error:  # of many kinds, by where the file was cut
+        except Exception as error:  # type depends on where the file was cut
             if not found:
                 raise Damaged(f"{path}: {type(error).__name__}: {error}") from error
 
 
 def read_turns(path: Path) -> Iterator[tuple[TurnInputs, Record]]:
-    """Inputs and command of each turn of the loop, in order. Raises Damaged and UsageError."""
+    """Inputs and command of each cycle, in order. Raises Damaged and UsageError."""
     inputs: dict[str, Any] | None = None
     states: list[Record] = []
     for topic, _, data in read_messages(path):
@@ -156,13 +156,13 @@ def _never(time: float | None) -> float:
 
 
 def export_digest(controller: Controller) -> str:
-    """Names of the exported programs in a log: the digests of their files."""
+    """Identity of an export in a log: the SHA-256 digests of its files."""
     return ",".join(f"{name}:{value}" for name, value in sorted(controller.contract.files.items()))
 
 
 def replay(path: Path, folder: Path) -> tuple[int, int]:
-    """Runs the inputs of a log through the state machine of the exported controller in `folder`, of which every command
-    must come out bit for bit: the number of turns, and of those whose command differs.
+    """Replays the inputs of a log through the state machine of the exported controller in `folder`; returns the number
+    of cycles, and of those whose command is not bit-identical.
 
     Raises UsageError for the log of another export, Damaged for a file that is no log.
     """

@@ -1,7 +1,7 @@
-"""The state machine that drives a robot: what arrived on the bus in, the next low-level command out.
+"""State machine of a robot: maps messages from the bus to the next low-level command.
 
-ZeroTorque → Damping → Stand → Run → Damping. It is a function of its inputs and of what it was given before, without
-clock, bus or files, so that a log of its inputs gives its commands again bit for bit.
+ZeroTorque → Damping → Stand → Run → Damping. It uses no clock, bus or files, so that replaying the logged inputs
+reproduces its commands bit for bit.
 """
 
 from collections.abc import Mapping
@@ -27,57 +27,57 @@ class State(StrEnum):
     """States of a robot."""
 
     ZERO_TORQUE = "zero-torque"
-    """The motors give nothing."""
+    """No torque."""
     DAMPING = "damping"
-    """The motors brake."""
+    """Velocity damping only."""
     STAND = "stand"
-    """Gains and posture move to those of standing, and stay there."""
+    """Gains and posture ramp to those of standing and stay there."""
     RUN = "run"
     """The policy acts."""
 
 
 BEFORE = {State.STAND: (State.DAMPING,), State.RUN: (State.STAND,)}
-"""States from which one is entered; the others are entered from everywhere."""
+"""Required previous state; states that are not listed can follow any state."""
 MOVING = tuple(BEFORE)
-"""States that end in damping where something is wrong."""
+"""States that change to damping on a fault."""
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """Request of an operator."""
+    """Command and request of an operator."""
 
     command: Array
     """C, (11,)."""
     at: float
-    """When the command was given [s]."""
+    """Time of the command [s]."""
     request: State | None = None
     """State to enter."""
     seen: Mapping[str, Array] = field(default_factory=lambda: MappingProxyType({}))
-    """Measurements of the object by name, a row each; none for a controller that observes none."""
+    """Measurements of the object by name, one row each; empty for a controller that observes none."""
     seen_at: float = -np.inf
-    """When the object was measured [s]."""
+    """Time of the object's measurement [s]."""
 
 
 @dataclass(frozen=True)
 class TurnInputs:
-    """Inputs of a turn of the loop."""
+    """Inputs of a cycle of the loop."""
 
     now: float
     """Monotonic clock [s]."""
     states: tuple[Record, ...]
-    """States that arrived since the last turn, oldest first."""
+    """States that arrived since the last cycle, oldest first."""
     wanted: Wanted
     others: int = 0
-    """Low-level commands that others sent since the last turn."""
+    """Number of low-level commands from other programs since the last cycle."""
     charge: float | None = None
-    """Of the battery, where its state arrived since the last turn [%]."""
+    """Battery charge, if its state arrived since the last cycle [%]."""
 
 
 class Machine:
     """State machine, watchdogs and controller of a robot."""
 
     def __init__(self, controller: Controller, scene: str, limits: SafetyLimits = LIMITS) -> None:
-        """`controller` of one robot; `scene`: base grasp and expected load. Raises ValueError for an unknown scene."""
+        """`controller`: of one robot; `scene`: base grasp and expected load. Raises ValueError for an unknown scene."""
         self.controller, self.limits, self._scene = controller, limits, scene
         controller.reset(scene=scene)
         self._contract = contract = controller.contract
@@ -86,10 +86,10 @@ class Machine:
         self.sensors = Sensors(self._joints)
         self.state = State.ZERO_TORQUE
         self.events: list[str] = []
-        """Events of the last turn: states entered, requests refused, and warnings, with the reason."""
+        """Events of the last cycle with their reasons: states entered, requests refused, and warnings."""
         self._kp, self._kd = np.array(contract.kp), np.array(contract.kd)
         self._turns = round(FREQUENCY / contract.control_frequency)
-        """Turns of the loop for each step of the policy."""
+        """Cycles of the loop per policy step."""
         self._turn = 0
         self._last = -np.inf
         self._entered = 0.0
@@ -98,7 +98,7 @@ class Machine:
         self._from = self._goal = self._target = np.array(contract.default_position)
 
     def turn(self, given: TurnInputs) -> Record:
-        """The command to send."""
+        """Low-level command of this cycle."""
         self.events = []
         self.sensors.take(given.states, given.now)
         self._charge = self._charge if given.charge is None else given.charge
@@ -110,7 +110,7 @@ class Machine:
                 self._enter(wanted, given, "requested")
             else:
                 self.events.append(f"{wanted} refused: {refusal}")
-        if self.state in MOVING:  # warn once after each Stand of a battery that is low or a motor that is warm
+        if self.state in MOVING:  # low battery or warm motor: warn once after each Stand
             found = self._exhausted(self.limits.battery, self.limits.temperature)
             self.events += [f"warning: {text}" for name, text in found.items() if name not in self._warned]
             self._warned |= found.keys()
@@ -120,7 +120,7 @@ class Machine:
         return self._command(given.now)
 
     def _danger(self, given: TurnInputs) -> str | None:
-        """The reason to damp, if there is one."""
+        """Reason to damp, or None."""
         limits = self.limits
         if given.others:
             return f"second publisher: {given.others} low-level commands of another program"
@@ -131,7 +131,7 @@ class Machine:
         return self._unfit(given.now)
 
     def _unfit(self, now: float) -> str | None:
-        """The reason for which a robot that has sent states may not move."""
+        """Reason against moving, of a robot that has sent states."""
         limits, posture = self.limits, self.sensors.posture
         assert posture is not None
         return (
@@ -145,7 +145,7 @@ class Machine:
         return checks.exhausted(self.sensors.posture, self._charge, self._contract.joints, least, most)
 
     def _refusal(self, wanted: State, given: TurnInputs) -> str | None:
-        """The reason not to enter a state that is asked for."""
+        """Reason to refuse a requested state."""
         limits, now = self.limits, self.sensors.posture
         if wanted not in BEFORE:
             return None
@@ -169,7 +169,7 @@ class Machine:
         return None
 
     def _uninformed(self, given: TurnInputs) -> str | None:
-        """The reason where the newest command, or object pose that the policy observes, is old."""
+        """Reason if the newest command, or an object pose that the policy observes, is stale or missing."""
         wanted, limits = given.wanted, self.limits
         if (age := given.now - wanted.at) > limits.command_age:
             return f"stale command: nothing new for {age:.2f} s"
@@ -191,7 +191,7 @@ class Machine:
             self.controller.reset(scene=self._scene)
 
     def _act(self, given: TurnInputs) -> None:
-        """A step of the policy every `_turns` turns; what it refuses leads to damping."""
+        """A policy step every `_turns` cycles; if its targets are held, the robot damps."""
         if self._turn == 0:
             measured = replace(self.sensors.measured, **given.wanted.seen)
             targets = self.controller.step(measured, given.wanted.command, measured_at=self.sensors.at)

@@ -1,7 +1,7 @@
-"""Messages of the G1's low-level bus as NumPy records, their encoding on the wire, and their checksum.
+"""Messages of the G1's low-level bus as NumPy records, their wire encoding, and their checksum.
 
-Layouts are the public IDL definitions `unitree_hg.msg.dds_`. A record has the layout of the C structure, over which the
-checksum goes; CDR, the encoding on the wire, aligns each number to its own size and pads no structure.
+Layouts are the public IDL definitions `unitree_hg.msg.dds_`. A record has the layout of the C structure, which the
+checksum covers; CDR, the wire encoding, aligns each number to its own size and does not pad structures.
 """
 
 import zlib
@@ -19,11 +19,11 @@ REMOTE = 40
 MODULE = "unitree_hg.msg.dds_"
 
 Record = np.ndarray[Any, np.dtype[np.void]]
-"""A message: an array of shape () of one of the types below."""
+"""A message: an array of shape () with one of the types below."""
 
 
 def _record(fields: str, **parts: np.dtype[np.void]) -> np.dtype[np.void]:
-    """A type by its fields, `name kind` or `name kind count` with commas between; `parts`: kinds that are records."""
+    """A type from its fields, comma-separated `name kind` or `name kind count`; `parts`: kinds that are records."""
     words = [field.split() for field in fields.split(", ")]
     return np.dtype([(name, parts.get(kind, kind), *map(int, count)) for name, kind, *count in words], align=True)
 
@@ -61,7 +61,7 @@ NAMES = {
 }
 """Names of the types in their IDL module."""
 HEADER = b"\x00\x01\x00\x00"
-"""Of a CDR message: little-endian, without options."""
+"""CDR header: little-endian, without options."""
 
 
 def empty(kind: np.dtype[np.void]) -> Record:
@@ -69,7 +69,7 @@ def empty(kind: np.dtype[np.void]) -> Record:
 
 
 def to_cdr(message: Record) -> bytes:
-    """The message as it goes over the wire, header included."""
+    """Wire encoding of the message, with header."""
     record, wire = _places(message.dtype)
     out = np.zeros(int(wire[-1]) + 1, np.uint8)
     out[wire] = np.frombuffer(message.tobytes(), np.uint8)[record]
@@ -89,7 +89,7 @@ def from_cdr(kind: np.dtype[np.void], data: bytes) -> Record:
 
 @cache
 def _places(kind: np.dtype[np.void]) -> tuple[Indices, Indices]:
-    """Places of each byte in the record and in the CDR encoding."""
+    """Offsets of each byte in the record and in the CDR encoding."""
     record, wire, end = [], [], 0
     for start, size in _numbers(kind, 0):
         end += -end % size
@@ -114,14 +114,14 @@ _REVERSED = np.array([int(f"{byte:08b}"[::-1], 2) for byte in range(256)], np.ui
 
 
 def checksum(message: Record) -> int:
-    """CRC-32 (polynomial 0x04C11DB7, not reflected, no final inversion) of the record's words but the last, `crc`."""
+    """CRC-32 (polynomial 0x04C11DB7, not reflected, no final inversion) of the record's words before the `crc`."""
     words: Array = np.frombuffer(message.tobytes(), np.uint8)[:-4].reshape(-1, 4)[:, ::-1]
     mirrored = ~zlib.crc32(_REVERSED[words].tobytes()) & 0xFFFFFFFF
     return int.from_bytes(_REVERSED[np.frombuffer(mirrored.to_bytes(4, "little"), np.uint8)].tobytes(), "big")
 
 
 def idl(kind: np.dtype[np.void]) -> str:
-    """The type and those in it as OMG IDL text."""
+    """OMG IDL text of the type and its nested types."""
     words = {"u1": "octet", "u2": "unsigned short", "u4": "unsigned long", "i2": "short", "i4": "long", "f4": "float"}
     needed, text = [], f"module unitree_hg {{ module msg {{ module dds_ {{\n@final struct {NAMES[kind]} {{\n"
     for name in kind.names or ():

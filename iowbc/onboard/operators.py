@@ -26,15 +26,15 @@ from iowbc.recipe.section import Section
 BUTTONS = ("R1", "L1", "start", "select", "R2", "L2", "F1", "F2", "A", "B", "X", "Y", "up", "right", "down", "left")
 """Bits of the remote's buttons."""
 REQUESTS = {"B": State.DAMPING, "select": State.ZERO_TORQUE, "start": State.DAMPING, "X": State.STAND, "A": State.RUN}
-"""States that a button asks for; the first one pressed counts."""
+"""State that each button requests; of several pressed at once, the first listed counts."""
 DEAD = 0.1
-"""Part of a stick's way that counts as its middle."""
+"""Deadband of a stick, as a fraction of its travel."""
 HEIGHT_RATE, PITCH_RATE = 0.1, 0.3
 """Rates at which the remote's arrows change height [m/s] and torso pitch [rad/s]."""
 KEYS = {" ": State.DAMPING, "0": State.ZERO_TORQUE, "1": State.DAMPING, "2": State.STAND, "3": State.RUN}
 STEPS = {"i": (0, 0.1), "k": (0, -0.1), "j": (1, 0.05), "l": (1, -0.05), "u": (YAW_RATE, 0.1), "o": (YAW_RATE, -0.1)}
 STEPS |= {"r": (HEIGHT, 0.02), "f": (HEIGHT, -0.02), "t": (PITCH, 0.1), "g": (PITCH, -0.1)}
-"""Step of a key on an entry of the command [m/s, rad/s, m, rad]."""
+"""Index of a command entry and step of each key [m/s, rad/s, m, rad]."""
 LARGEST_DATAGRAM = 8192
 
 
@@ -42,11 +42,11 @@ class Operator(Protocol):
     """A source of commands."""
 
     def wanted(self, now: float, state: Record | None) -> Wanted:
-        """Request at `now` [s]; `state`: the robot's newest one."""
+        """Command and request at `now` [s]; `state`: the robot's newest state."""
 
 
 class Ranges:
-    """Commands as training knew them: standing at first, and clipped."""
+    """Command ranges of training, and the command to stand."""
 
     def __init__(self, contract: Contract) -> None:
         known = contract.commands
@@ -67,8 +67,8 @@ class Ranges:
 class Remote:
     """The wireless remote, whose bytes come with the robot's state.
 
-    Left stick: velocity; right stick: turning; arrows: height and torso pitch. B damps, Start leaves zero torque, X
-    stands, A runs, Select gives zero torque.
+    Left stick: velocity; right stick: yaw rate; arrows: height and torso pitch. B: damping; Start: damping, from zero
+    torque; X: stand; A: run; Select: zero torque.
     """
 
     def __init__(self, ranges: Ranges) -> None:
@@ -119,7 +119,7 @@ class Keyboard:
 
 @contextlib.contextmanager
 def single_keys() -> Iterator[None]:
-    """A terminal that gives each key at once. Raises UsageError where there is none."""
+    """Makes the terminal deliver single keys without Enter. Raises UsageError without a terminal."""
     import termios
     import tty
 
@@ -137,13 +137,13 @@ class Datagram(Section):
     """A command over UDP, as JSON."""
 
     velocity: tuple[float, float] = (0.0, 0.0)
-    """Forward and to the left [m/s]."""
+    """Velocity forward and to the left [m/s]."""
     yaw_rate: float = 0.0
-    """To the left [rad/s]."""
+    """Yaw rate to the left [rad/s]."""
     height: float | None = None
-    """Of the pelvis [m]; that of training's nominal posture by default."""
+    """Height of the pelvis [m]; by default that of training's nominal command."""
     pitch: float | None = None
-    """Of the torso, forward [rad]; the same."""
+    """Forward pitch of the torso [rad]; same default."""
     wrists: tuple[float, float, float, float, float, float] = (0.0,) * 6
     """Offsets of the left and right wrist, heading frame [m]."""
     request: State | None = None
@@ -153,7 +153,7 @@ class Datagram(Section):
 
 
 class Udp:
-    """JSON datagrams at a port of this machine; see `Datagram`. One that cannot be read changes nothing."""
+    """JSON datagrams at a local port; see `Datagram`. Datagrams that cannot be parsed are ignored."""
 
     def __init__(self, ranges: Ranges, port: int) -> None:
         self._ranges = ranges
@@ -195,11 +195,11 @@ class Udp:
 
 @dataclass(frozen=True)
 class OperatorWithPoses:
-    """An operator beside whom another source delivers the object's pose."""
+    """An operator with a separate source of object poses."""
 
     operator: Operator
     poses: Udp
-    """Of its datagrams only `seen` counts."""
+    """Only `seen` of its datagrams is used."""
 
     def wanted(self, now: float, state: Record | None) -> Wanted:
         pose = self.poses.wanted(now, state)

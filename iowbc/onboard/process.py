@@ -1,4 +1,4 @@
-"""The process that drives a robot: checks, then the loop of states in and commands out, timed and logged."""
+"""Process that drives a robot: checks, then a loop from states to commands, timed and logged."""
 
 import ctypes
 import gc
@@ -19,48 +19,48 @@ from iowbc.onboard.operators import Operator
 
 PERIOD = 1.0 / FREQUENCY
 PATIENCE = 1.0
-"""Time after which a robot in lock step counts as gone [s]."""
+"""Timeout for the next state in lock step [s]."""
 DISCOVERY = 10.0
-"""For how long the first state is waited for [s]: participants find each other within some seconds."""
+"""Timeout for the first state [s]: participants discover each other within some seconds."""
 FINAL_DAMPING = 0.5
-"""For how long damping is commanded at the end [s]."""
+"""Duration of damping at the end [s]."""
 REALTIME_PRIORITY = 60
 """Above ordinary threads of the kernel's real-time class, below its own."""
 KEPT_TIMES = 1 << 20
-"""Latest turns of which times are kept for the statistics: 35 minutes."""
+"""Number of latest cycles kept for the timing statistics: 35 minutes."""
 
 
 class Bus(Protocol):
-    """Publishes messages and takes those of other participants; topics follow from the kinds of messages."""
+    """Publishes messages and receives those of other participants; the kind of message determines the topic."""
 
     def publish(self, message: Record) -> None:
         """Sends a message of any kind."""
 
     def take(self, kind: np.dtype[np.void]) -> list[Record]:
-        """Messages of a kind from others since the last call, oldest first."""
+        """Messages of one kind from others since the last call, oldest first."""
 
     def wait(self, kind: np.dtype[np.void], seconds: float) -> bool:
-        """Waits until there is something to take; False where nothing came in time."""
+        """Waits for a message; False after the timeout [s]."""
 
     def high_level_mode(self, seconds: float) -> str | None:
-        """Name of the robot's own controller that is active, "" for none, None where the robot does not answer."""
+        """Name of the robot's active built-in controller: "" for none, None without an answer."""
 
     def close(self) -> None:
         """Leaves the bus."""
 
 
 class Clock(Protocol):
-    """When the turns of the loop take place."""
+    """Timing of the loop's cycles."""
 
     late: float
-    """Delay of the beginning of the last turn [s]."""
+    """Delay of the last cycle's start [s]."""
 
     def turn(self, bus: Bus) -> tuple[float, tuple[Record, ...]]:
-        """Waits for the next turn; its time [s], and the states that have arrived."""
+        """Waits for the next cycle; returns its time [s] and the states that have arrived."""
 
 
 class MonotonicClock:
-    """Turns at equal times of this machine's monotonic clock; those that were missed are left out."""
+    """Periodic cycles on this machine's monotonic clock; missed ones are skipped."""
 
     def __init__(self) -> None:
         self._due = time.monotonic()
@@ -78,7 +78,7 @@ class MonotonicClock:
 
 
 class LockStep:
-    """A turn for each state that a simulated robot sends, which waits for the command: as fast or slow as both are."""
+    """One cycle for each state of a simulated robot, which waits for the command: runs as fast as both can."""
 
     late = 0.0
 
@@ -94,12 +94,12 @@ class LockStep:
 
 @dataclass(frozen=True)
 class Times:
-    """Regularity of the loop."""
+    """Timing of the loop."""
 
     late: np.ndarray
-    """Delay of the beginning of each turn [s]."""
+    """Delay of each cycle's start [s]."""
     busy: np.ndarray
-    """Duration of each turn [s]."""
+    """Duration of each cycle [s]."""
 
     def __str__(self) -> str:
         if not len(self.late):
@@ -113,7 +113,7 @@ class Times:
 
 
 def listen(bus: Bus, seconds: float) -> Listened:
-    """Messages on the bus for some time [s], from the first state on."""
+    """Receives messages for some time [s] from the first state on."""
     states: list[Record] = []
     battery: Record | None = None
     others = 0
@@ -129,7 +129,7 @@ def listen(bus: Bus, seconds: float) -> Listened:
 
 
 def prefer_this_process() -> str:
-    """Locks memory and raises priority where allowed; says what was."""
+    """Locks memory and raises the priority where allowed; returns a summary."""
     libc = ctypes.CDLL(None, use_errno=True)
     locked = libc.mlockall(3) == 0  # MCL_CURRENT | MCL_FUTURE
     try:
@@ -154,7 +154,7 @@ def drive(
     stopped: Callable[[], bool] = lambda: False,
 ) -> Times:
     """Drives the robot until `stopped` or for some time [s], and damps it at the end."""
-    kept = np.full((2, KEPT_TIMES), np.nan, np.float32)  # in memory from the beginning
+    kept = np.full((2, KEPT_TIMES), np.nan, np.float32)  # allocated in advance
     turns = 0
     begin: float | None = None
     leaving: float | None = None

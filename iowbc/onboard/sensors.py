@@ -1,4 +1,4 @@
-"""From the bus's states to the measurements of the controller; refuses what is old, repeated or no number."""
+"""Conversion of the bus's states to the controller's measurements; skips repeated and outdated states."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ from iowbc.onboard.messages import Record
 from iowbc.robot import rotations
 
 CLOCK_DRIFT = 2e-4
-"""Drift between the robot's clock and this one that is not taken for delay [s/s]."""
+"""Clock drift between the robot and this machine that does not count as delay [s/s]."""
 
 
 @dataclass(frozen=True)
@@ -22,15 +22,15 @@ class MeasuredState:
     velocity: Array
     """(joints,) [rad/s]."""
     torque: Array
-    """Estimated by the motors' drives, (joints,) [N·m]."""
+    """Torque as estimated by the motor drives, (joints,) [N·m]."""
     temperature: Array
-    """Of the warmer of a motor's two sensors, (joints,) [°C]."""
+    """Temperature of the warmer of each motor's two sensors, (joints,) [°C]."""
     gravity: Array
     """Direction of gravity, base frame, (3,)."""
     turning: Array
     """Angular velocity, base frame, (3,) [rad/s]."""
     yaw: float
-    """Heading without the turns before [rad]."""
+    """Heading within ±π [rad]."""
 
     @property
     def tilt(self) -> float:
@@ -39,7 +39,7 @@ class MeasuredState:
 
 
 def posture(state: Record, joints: int) -> MeasuredState:
-    """The values of a state; numbers need not be finite."""
+    """Measurements in a state; they may be non-finite."""
     motors, imu = state["motor_state"][:joints], state["imu_state"]
     quaternion = imu["quaternion"].astype(np.float64)
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
@@ -56,7 +56,7 @@ def posture(state: Record, joints: int) -> MeasuredState:
 
 
 class Sensors:
-    """Newest state of a robot, its age, and its heading over any number of turns."""
+    """Newest state of a robot, its age, and its unwrapped heading."""
 
     def __init__(self, joints: int) -> None:
         self._joints = joints
@@ -64,13 +64,13 @@ class Sensors:
         self.posture: MeasuredState | None = None
         self.heading = 0.0
         self.at = -np.inf
-        """When the newest state arrived [s]."""
+        """Arrival time of the newest state [s]."""
         self.late = 0.0
-        """Excess of its delay over the usual one, by the robot's clock [s]."""
+        """Its delay beyond the smallest one so far, by the robot's clock [s]."""
         self._least, self._least_at = np.inf, 0.0
 
     def take(self, states: tuple[Record, ...], now: float) -> None:
-        """Takes in what arrived, oldest first, at `now` [s]."""
+        """Processes the states that arrived, oldest first, at `now` [s]."""
         for state in states:
             if self._repeated(state):
                 continue
@@ -86,7 +86,7 @@ class Sensors:
             self._least_at, self.late = now, offset - self._least
 
     def _repeated(self, state: Record) -> bool:
-        """True for a state that is no newer than the last, or has its very values: sensors have noise."""
+        """True for a state that is no newer than the last or has identical values, since sensors have noise."""
         last = self.state
         if last is None:
             return False

@@ -1,4 +1,4 @@
-"""Digests of the code that decides a stage's result: the modules that its imports lead to."""
+"""Digests of the code that determines a stage's result: all modules that it imports, transitively."""
 
 import ast
 import functools
@@ -9,14 +9,14 @@ from iowbc.pipeline.stage import Stage
 from iowbc.pipeline.store.digests import PACKAGE, content_digest, syntax_digest
 
 CARRYING_OUT = ("pipeline", "errors", "files", "full_disk", "processes")
-"""Rooms that carry stages out and compute nothing of a result; neither they nor what they import count."""
+"""Subpackages and modules that run stages but compute no result; they and their imports are ignored."""
 IN_KEYS = "recipe.recipe"
-"""The module of the recipe as a whole: its values are in keys, and of its sections only those that a stage's code
-names itself count."""
+"""The module of the whole recipe, whose imports are ignored: its values are in keys, and sections count only if a
+stage's code imports them itself."""
 
 
 def stage_code(stage: Stage) -> Mapping[str, str]:
-    """Digest of the stage's own module and, by room, of the modules of the package that it imports, however deep."""
+    """Digest of the stage's own module, and of its transitive imports within the package, by subpackage."""
     own = stage.run.__module__.removeprefix(f"{PACKAGE.name}.")
     return _code_of(own) if own != stage.run.__module__ else {}
 
@@ -32,7 +32,7 @@ def _code_of(own: str) -> Mapping[str, str]:
 
 
 def changed_code(old: Mapping[str, str], new: Mapping[str, str]) -> list[str]:
-    """Names of the rooms and modules whose code differs."""
+    """Names of the subpackages and modules whose code differs."""
     return sorted(name for name in old.keys() | new.keys() if old.get(name) != new.get(name))
 
 
@@ -57,7 +57,7 @@ def _imports(source: Path) -> frozenset[str]:
 
 
 def _imported(node: ast.AST) -> Iterator[str]:
-    """Dotted names of what a syntax tree imports, except for the type checker alone."""
+    """Dotted names of all imports in a syntax tree except those under `TYPE_CHECKING`."""
     if isinstance(node, ast.Import):
         yield from (alias.name for alias in node.names)
     elif isinstance(node, ast.ImportFrom):

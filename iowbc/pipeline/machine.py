@@ -29,11 +29,11 @@ def versions() -> dict[str, str]:
 
 @dataclass(frozen=True)
 class Identity:
-    """A machine as far as results depend on it."""
+    """The properties of a machine that results depend on."""
 
     host: str
     versions: dict[str, str]
-    """Of Python and of the packages that shape a result."""
+    """Versions of Python and of the packages that affect results."""
     code: str
     """Digest of the package's modules."""
 

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 MISSING = object()
-"""Stands for a value that is not there."""
+"""Placeholder for a missing value."""
 
 
 def nested(slices: Mapping[str, Any]) -> dict[str, Any]:

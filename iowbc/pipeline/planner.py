@@ -23,7 +23,7 @@ NOT_WHOLE = "its published artifact leaves out large files"
 
 @dataclass(eq=False)
 class Planner:
-    """Decides, stage by stage, for one recipe on one store."""
+    """Planner of one recipe on one store."""
 
     loaded: LoadedRecipe
     stages: Sequence[Stage]
@@ -31,14 +31,14 @@ class Planner:
     robot: Path
     options: Options
     origins: Mapping[tuple[str, str], "Planner"]
-    """By stage and input, the planner of the recipe that makes what is borrowed; see `planner_for`."""
+    """Planners of the recipes that make borrowed artifacts, by stage and input; see `planner_for`."""
 
     def __post_init__(self) -> None:
         self.robot_digest = folder_digest(self.robot)
         self.deciding = deciding(self.loaded.recipe)
 
     def plan(self, known: "Plans | None" = None) -> list[StagePlan]:
-        """A step for each stage, as things stand; nothing is changed. `known`: plans made in the same moment."""
+        """The plan of each stage for the current store, which is not changed. `known`: plans that were just made."""
         known, steps = {} if known is None else known, dict[str, StagePlan]()
         if self in known:
             return known[self]
@@ -72,7 +72,7 @@ class Planner:
         return found
 
     def named(self, borrowed: Borrowed) -> Artifact:
-        """The stored artifact whose key the recipe names. Raises `RecipeError` without one, or where it is damaged."""
+        """The stored artifact whose key the recipe names. Raises `RecipeError` unless exactly one fits, undamaged."""
         found = [one for one in self.store.artifacts(borrowed.stage) if one.manifest.key.startswith(borrowed.named)]
         if len(found) != 1:
             keys = ", ".join(one.manifest.key[:12] for one in found) or "none"
@@ -111,7 +111,7 @@ class Planner:
         return self._resumed(step) if step.reasons else step
 
     def _looked_up(self, step: StagePlan, whole: bool) -> StagePlan:
-        """With the stored artifact of its key, where that is whole, why it is not used, and what there is to say."""
+        """The plan with the stored, undamaged artifact of its key, the reasons not to use it, and notes."""
         stage, notes = step.stage, list[str]()
         reasons = ["forced by --force"] if stage.name in self.options.force else []
         artifact, damage = self.store.checked(stage.name, step.known_key)
@@ -134,12 +134,12 @@ class Planner:
         return replace(step, artifact=artifact, damage=damage, reasons=tuple(reasons), notes=tuple(notes))
 
     def _resumed(self, step: StagePlan) -> StagePlan:
-        """A step that runs, with what it goes on from: an earlier attempt, or an artifact that ends earlier."""
+        """The plan of a stage that runs, with the earlier attempt or the artifact of a shorter run to resume."""
         stage, notes, expected, predecessor = step.stage, list(step.notes), step.expected, None
         record, forced = read_progress(self.store.runs.work / step.known_key), stage.name in self.options.force
         if record and (record.forced or not forced):
             notes.append(", ".join(filter(None, [f"goes on from attempt {record.attempts or 1}", record.share])))
-            if record.done and record.total and record.seconds:  # the rest at its own rate
+            if record.done and record.total and record.seconds:  # the remaining part at the attempt's rate
                 expected = record.seconds * max(0.0, record.total / record.done - 1.0)
         if not forced:
             predecessor = self._predecessor(stage, step.ingredients)
@@ -149,7 +149,7 @@ class Planner:
         return replace(step, notes=tuple(notes), expected=expected, predecessor=predecessor)
 
     def _predecessor(self, stage: Stage, ingredients: Mapping[str, Any]) -> Artifact | None:
-        """The whole artifact of a stage that differs in nothing but an earlier end, the latest of several."""
+        """The undamaged artifact that differs only in a smaller `stage.extends`; of several the longest."""
         if stage.extends is None:
             return None
         aim = slice_value(self.deciding, stage.extends, stage)
@@ -170,7 +170,7 @@ class Planner:
         return None
 
     def _looks(self, stage: Stage, artifact: Artifact) -> Iterator[str]:
-        """Cosmetic values of a stage that an artifact was made with otherwise: it is used, and looks as it did."""
+        """Notes on cosmetic values that differ from those an artifact was made with; it is used unchanged."""
         for path, old, new in differences(artifact.recipe, self.loaded.recipe.model_dump(mode="json")):
             of_stage = any(path == part or path.startswith(f"{part}.") for part in stage.slice)
             if (
@@ -191,7 +191,7 @@ class Planner:
         return min(self.store.artifacts(stage), key=distance, default=None)
 
     def _reasons(self, ingredients: Mapping[str, Any], former: Artifact | None, unknown: Sequence[str]) -> list[str]:
-        """Why a stage is made: whose artifact it is compared with, inputs made anew, then all that differs."""
+        """Reasons to run a stage: the recipe compared with, inputs that are re-made, then all differences."""
         if former is None:
             return ["nothing stored yet"]
         found = list(self._differences(ingredients, former.ingredients))
@@ -216,7 +216,7 @@ class Planner:
 
 
 Plans = dict[Planner, list[StagePlan]]
-"""Plans by planner: what several recipes begin from is planned once."""
+"""Plans by planner, so that a recipe that several others start from is planned once."""
 
 
 def planner_for(
@@ -228,10 +228,10 @@ def planner_for(
     above: Sequence[Path] = (),
     ready: "dict[tuple[Path, str], Planner] | None" = None,
 ) -> Planner:
-    """The planner of a recipe, and of those whose artifacts it begins from. `above`: files of the recipes that begin
-    from this one; `ready`: planners by file and last stage, for those that several begin from.
+    """The planner of a recipe and of those whose artifacts it borrows. `above`: files of the recipes that borrow from
+    it; `ready`: shared planners by file and last stage.
 
-    Raises `RecipeError` for stages that the recipe has not, or that cannot run, and for a start that is not there.
+    Raises `RecipeError` for stages that are missing or cannot run, and for missing borrowed artifacts.
     """
     stages = _selected(loaded, registry, options)
     itself = () if loaded.overrides else (loaded.file.resolve(),)
@@ -252,7 +252,7 @@ def planner_for(
 
 
 def _selected(loaded: LoadedRecipe, registry: Mapping[str, Stage], options: Options) -> list[Stage]:
-    """The recipe's stages up to `--until`. Raises `RecipeError` for names that are not the recipe's."""
+    """The recipe's stages up to `--until`. Raises `RecipeError` for unknown stages and their problems."""
     names = [str(name) for name in loaded.recipe.stages]
     for option, asked in (("--until", [options.until or names[-1]]), ("--force", sorted(options.force))):
         for name in asked:
@@ -278,13 +278,13 @@ def _selected(loaded: LoadedRecipe, registry: Mapping[str, Stage], options: Opti
 
 
 def wrong_origin(loaded: LoadedRecipe, borrowed: Borrowed, text: str) -> RecipeError:
-    """The error that a stage cannot read what the recipe names."""
+    """The error that the recipe names an artifact which a stage cannot read."""
     path = borrowed.path
     return RecipeError([Problem(loaded.place(path), f"key '{path}' = {shown(borrowed.named)}: {text}")])
 
 
 def _origin(loaded: LoadedRecipe, borrowed: Borrowed, above: Sequence[Path]) -> LoadedRecipe | None:
-    """The recipe that makes what is borrowed, where a file is named. Raises `RecipeError` if it cannot be it."""
+    """The recipe of a borrowed artifact, if named by file. Raises `RecipeError` if that recipe does not fit."""
     if Path(borrowed.named).suffix not in SUFFIXES:
         return None
     place = loaded.place(borrowed.path)

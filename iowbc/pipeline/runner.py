@@ -1,4 +1,4 @@
-"""Runs the stages of a recipe: reuses what is stored, makes the rest, loses nothing."""
+"""Runs the stages of a recipe: uses cached artifacts, makes the others, and keeps checkpoints of interrupted ones."""
 
 import contextlib
 import time
@@ -74,11 +74,11 @@ class Runner:
     tracker: Tracker | None
     interrupted: Callable[[], bool]
     command: Callable[[], str] = lambda: ""
-    """What goes on with this run after the stages in `made`; kept with a stage while it is made."""
+    """Command that resumes this run after the stages in `made`; recorded with each stage while it runs."""
     execute: Callable[[Stage, Job], None] = run_here
-    """Carries a stage out, with the same result wherever."""
+    """Function that runs a stage, here or on a cluster with the same result."""
     workers: int = 0
-    """Processes of a stage where neither options nor recipe say how many; 0: as many as there are cores."""
+    """Worker processes of a stage if neither options nor recipe set them; 0: one per core."""
     artifacts: dict[str, Artifact] = field(default_factory=dict)
     made: list[str] = field(default_factory=list)
     """Stages that were not cached."""
@@ -142,7 +142,7 @@ class Runner:
             return self._made(step, workspace)
 
     def _clear(self, stage: Stage, key: str) -> None:
-        """Remove what a process left that died after it had put this artifact into the store."""
+        """Remove the work folder of a process that died after storing this artifact."""
         workspace = Workspace(self.store.runs, stage.name, key)
         if workspace.leftover:
             with key_lock(self.store.runs, key, lambda holder: None, lambda: True) as held:
@@ -166,7 +166,7 @@ class Runner:
         return step.artifact
 
     def _finish_adding(self, workspace: Workspace) -> None:
-        """Take output into the store that was sealed when its process died on the threshold."""
+        """Store output that was already sealed when its process died."""
         with contextlib.suppress(Damaged):
             if workspace.out.is_dir():
                 read_artifact(workspace.out, workspace.stage, workspace.key).verify()

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 SUMMARY = "summary.json"
 """File of an artifact with its metrics."""
 START = "start"
-"""Name among a job's inputs of the artifact that it begins from; see `Stage.borrows`."""
+"""Input name of the artifact that a stage starts from; see `Stage.borrows`."""
 
 
 class Report(Protocol):
@@ -24,7 +24,7 @@ class Report(Protocol):
         """Record named values at a step; one batched tracking call."""
 
     def progress(self, done: float, total: float, note: str = "") -> None:
-        """Say how far the stage is, in units of its own (samples, environment steps, trials)."""
+        """Report progress, in units of the stage (samples, environment steps, trials)."""
 
     def say(self, text: str) -> None:
         """Print one line."""
@@ -37,10 +37,10 @@ class Member(Protocol):
     """An object that works for a stage on another machine, and can be remade there or elsewhere."""
 
     def ask(self, message: Any) -> Any:
-        """Do what is asked; the answer."""
+        """Carry out a request; returns the answer."""
 
     def state(self) -> Any:
-        """Everything that the future depends on."""
+        """Complete state of the object."""
 
     def restore(self, state: Any) -> None:
         """Inverse of `state`."""
@@ -67,12 +67,12 @@ class Job:
     interrupted: Callable[[], bool]
     """True once the user asked to stop: write a checkpoint and raise `Interrupted`."""
     predecessor: Path | None = None
-    """Artifact folder of the same stage that this one goes on from; see `Stage.extends`."""
+    """Folder of an artifact of the same stage that this job continues; see `Stage.extends`."""
     spread: "NodeSpread | None" = None
     """Other machines that may work for the stage; never changes a result."""
 
     def summarize(self, metrics: Mapping[str, float], **details: Any) -> None:
-        """Leave `summary.json`: the figures that tell how it went, shown wherever the artifact is, and details."""
+        """Write `summary.json`: metrics, shown wherever the artifact is listed, and details."""
         text = json.dumps({"metrics": dict(metrics), **details}, indent=1) + "\n"
         (self.out / SUMMARY).write_text(text, encoding="utf-8")
 
@@ -91,7 +91,7 @@ class Borrowed:
 
 @dataclass(frozen=True)
 class Presentation:
-    """Presentation of artifacts of a stage, and what other commands find in them."""
+    """How commands and reports present a stage's artifacts."""
 
     headline: tuple[str, ...] = ()
     """Patterns of the metrics that are shown at the end of a run, the most telling first; `show` has all."""
@@ -120,8 +120,8 @@ class Stage:
     """Names of the stages whose artifacts this one reads, for a given recipe."""
     run: Callable[[Job], None]
     results: tuple[str, ...] = ("*",)
-    """Patterns of the files that decide the stages which read this one, the same for the same key; all others are
-    records: curves, times, pictures, convenience."""
+    """Patterns of the files that later stages depend on, identical for the same key. All other files are records:
+    curves, times, pictures."""
     problems: Callable[[Recipe], Iterator[tuple[str, str]]] = lambda recipe: iter(())
     """Requests of a recipe that this stage cannot fulfil, known before it runs: dotted paths, and the problem there."""
     defaults: Callable[[Recipe], Mapping[str, Any]] = lambda recipe: {}
@@ -130,22 +130,22 @@ class Stage:
     """Dotted recipe path of a number that only says where the work ends: the stage goes on from an artifact that
     differs in nothing but a smaller one, as if it had never stopped."""
     extends_from: tuple[str, ...] = ()
-    """Files of that artifact that it goes on from; where a published one lacks any, it starts anew."""
+    """Files needed to continue that artifact; if a published one lacks any, the stage starts from the beginning."""
     borrows: Callable[[Recipe], Mapping[str, Borrowed]] = lambda recipe: {}
     """Artifacts that other recipes make, by their names among the job's inputs, for a given recipe."""
     counts: tuple[str, ...] = ()
     """Dotted recipe paths of numbers that the time it takes is proportional to."""
     presentation: Presentation = Presentation()
     spreads: Callable[[Recipe], bool] = lambda recipe: False
-    """True for a recipe of which it leaves its heavy work to `Job.spread` where there is one."""
+    """True for a recipe whose heavy work runs on `Job.spread`, if there is one."""
 
     def key_values(self, recipe: Recipe, deciding: Mapping[str, Any]) -> dict[str, Any]:
-        """By dotted path: the values of a recipe that decide the result, and the program's defaults beside them."""
+        """Recipe values that determine the result, and the built-in `defaults`, by dotted path."""
         return {path: slice_value(deciding, path, self) for path in self.slice} | dict(self.defaults(recipe))
 
 
 def slice_value(values: Mapping[str, Any], path: str, stage: Stage) -> Any:
-    """The part at a dotted path of what decides a recipe's results."""
+    """The value at a dotted path; raises ValueError for a path that must not be, or is not, in keys."""
     if path.split(".")[0] in ("execution", "stages"):
         raise ValueError(f"stage {stage.name}: '{path}' must not be part of a key")
     value: Any = values

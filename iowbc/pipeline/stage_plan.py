@@ -26,10 +26,10 @@ class StagePlan:
 
     stage: Stage
     key: str | None = None
-    """None while an input's content is not known."""
+    """None if an input still has to be made."""
     ingredients: Mapping[str, Any] = field(default_factory=dict)
     inputs: Mapping[str, Artifact] = field(default_factory=dict)
-    """Artifacts that it reads, as far as they are there."""
+    """Input artifacts that exist."""
     artifact: Artifact | None = None
     """The stored artifact with this key, whole; also where it would be replaced."""
     reasons: tuple[str, ...] = ()
@@ -40,11 +40,11 @@ class StagePlan:
     expected: float | None = None
     """Time that it takes by its last runs on this machine or by its last attempt [s]; None where there are none."""
     spread: tuple[float, float] = (1.0, 1.0)
-    """Ends of the range in which that will lie, as parts of it."""
+    """Range of the expected time, as factors of it."""
     roughly: float | None = None
-    """A guess where there are none, at the rate of the stored artifact that differs least [s]."""
+    """A guess at the rate of the most similar stored artifact, if there are no such runs [s]."""
     rate_of: str = ""
-    """Recipe, and other machine, whose rate that is."""
+    """Source of that rate: a recipe, and "on another machine" if so."""
     code: Mapping[str, str] = field(default_factory=dict)
     predecessor: Artifact | None = None
     """The stored artifact that it would go on from."""
@@ -57,7 +57,7 @@ class StagePlan:
 
     @property
     def cached(self) -> bool:
-        """True where the stored artifact is used as it is."""
+        """True if the stage does not have to run."""
         return not self.reasons
 
     @property
@@ -67,5 +67,5 @@ class StagePlan:
 
     @property
     def guess(self) -> float | None:
-        """The expected time, or what comes nearest to one [s]."""
+        """The expected time, else the guess [s]."""
         return self.roughly if self.expected is None else self.expected

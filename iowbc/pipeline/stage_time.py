@@ -13,7 +13,7 @@ from iowbc.pipeline.store.artifact import Artifact
 from iowbc.recipe.recipe import SEEDS
 
 LAST_RUNS = 5
-"""Runs that an estimate is learnt from: older ones are of an older program or of another load."""
+"""Number of runs that an estimate uses; older ones were made by older code or under another load."""
 UNSEEN = (0.8, 1.25)
 """Factors by which the next run may lie beyond the fastest and the slowest of them, for other programs change times."""
 

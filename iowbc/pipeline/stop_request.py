@@ -1,8 +1,8 @@
 """SIGINT, SIGTERM and SIGHUP: the first asks the stage to stop after a checkpoint, the second aborts.
 
-SIGHUP says that the terminal is gone. It never aborts, for it comes twice where a shell passes it on and then ends, and
-it means nothing to a run that was started to go on without a terminal (`nohup`). After one, later ones are ignored to
-the end of the process: the second may come while what was stopped is written down.
+SIGHUP means that the terminal is closed. It never aborts, because it comes twice if a shell forwards it and then ends;
+it is ignored in a run started with `nohup`. After the first, later ones are ignored until the process ends: the second
+may arrive while the stopped state is being written.
 """
 
 import contextlib
@@ -18,13 +18,13 @@ class StopRequest:
     """While entered, turns the signals into a flag."""
 
     def __init__(self, *, shown: bool = False) -> None:
-        """shown: somebody else shows `text`, as the live table does; nothing is written here."""
+        """shown: `text` is displayed elsewhere, as by the live table, and not written here."""
         self.shown = shown
         self.signal: signal.Signals | None = None
         self._afterwards: dict[signal.Signals, object] = {}
 
     def __call__(self) -> bool:
-        """True once a stop was asked for."""
+        """True once a stop is requested."""
         return self.signal is not None
 
     @property
@@ -58,5 +58,5 @@ class StopRequest:
 
     def _write(self, text: str) -> None:
         if not self.shown:
-            with contextlib.suppress(OSError):  # of a terminal that is gone
+            with contextlib.suppress(OSError):  # the terminal may be closed
                 os.write(2, f"\n{text}\n".encode())

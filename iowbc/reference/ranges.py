@@ -9,14 +9,14 @@ from iowbc.recipe.generator import ReferenceGenerator
 from iowbc.robot.description import Robot
 
 LOWEST, HIGHEST = 0.3, 1.1
-"""Heights that may be tried, in heights of the straight-legged base: a slip of unit or digit lies outside. The feasible
-map finds the true bounds."""
+"""Range of heights that may be sampled, relative to the base height with straight legs; catches wrong units and typos.
+The feasible map finds the true bounds."""
 STEEPEST = np.pi / 2
 """Largest torso pitch [rad]."""
 
 
 def wrong_ranges(robot: Robot, recipe: ReferenceGenerator) -> Iterator[tuple[str, str]]:
-    """Dotted recipe path of each range that the robot does not have or cannot reach, and what is wrong with it."""
+    """Dotted recipe path and error of each range that the robot does not have or cannot reach."""
     sampling = recipe.sampling
     arms = {robot.joints[index]: index for index in robot.interaction}
     for name, asked in sampling.joint_ranges.items():

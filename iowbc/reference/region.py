@@ -1,4 +1,4 @@
-"""The feasible (height, pitch): by labels on a grid and around it, and by gentle motion of the fitted network."""
+"""Feasible (height, pitch) region: by labels on and around a grid, and by smoothness of the fitted network."""
 
 from dataclasses import dataclass
 
@@ -11,31 +11,31 @@ from iowbc.reference.labels.dataset import Dataset
 from iowbc.reference.labels.plan import SamplePlan
 
 ARMS_COLLIDE = "arms collide"
-"""A reason that says nothing of height and pitch."""
+"""Reason for rejection that does not depend on height and pitch."""
 
 
 @dataclass(frozen=True)
 class LabelledRegion:
-    """The map of what has labels, and what it was made from, on the grid (pitches, heights)."""
+    """Map of the commands with labels, and its data on the grid (pitches, heights)."""
 
     map: FeasibleMap
     held: Mask
     """True where one of the grid's two arm postures has a label."""
     share: Array
-    """Share of the samples around a command that have a label; -1 where there were too few."""
+    """Fraction of the samples around a command that have a label; -1 for too few samples."""
 
 
 @dataclass(frozen=True)
 class GentleRegion:
-    """The map of what has labels and a gentle reference, and what it was made from, on the grid (pitches, heights)."""
+    """Map of the commands with labels and a smooth reference, and its data on the grid (pitches, heights)."""
 
     map: FeasibleMap
     jump: Array
-    """Largest move of a joint for one step, not passed by the recipe's share of the arms [rad]."""
+    """Largest joint move for one step: its quantile `gentle_share` over the arms [rad]."""
 
 
 def measure_labelled_region(plan: SamplePlan, dataset: Dataset) -> LabelledRegion:
-    """The map of commands that have labels. Raises ValueError when it is empty."""
+    """Map of the commands that have labels. Raises ValueError if it is empty."""
     recipe = plan.recipe.feasible
     on_grid = dataset.index >= plan.drawn
     found = np.zeros(plan.grid_shape, dtype=bool)
@@ -53,9 +53,9 @@ def measure_labelled_region(plan: SamplePlan, dataset: Dataset) -> LabelledRegio
 
 
 def measure_gentle_region(plan: SamplePlan, held: FeasibleMap, network: ReferenceNetwork, arms: Array) -> GentleRegion:
-    """The part of a map where the network moves gently with height and pitch, for arms (n, 14).
+    """Part of a map where the network moves smoothly with height and pitch, for arms (n, 14).
 
-    Raises ValueError when it is empty.
+    Raises ValueError if it is empty.
     """
     recipe, smooth = plan.recipe.feasible, plan.recipe.fit.smoothness
     chosen = np.linspace(0, len(arms) - 1, min(recipe.arms, len(arms))).astype(int)

@@ -32,22 +32,22 @@ ERRORS = {
     "E_h": "E_h [m]",
 }
 SWEPT = 2
-"""Masses from which on a suite has a curve."""
+"""Minimum number of masses for a curve of a suite."""
 PICTURE_POINTS = 120
 """Points of a curve in a picture, where noise cannot be zoomed into."""
 COLUMNS = 3
-"""Panels of a picture side by side."""
+"""Number of panels per row of a picture."""
 PANEL_SIZE = (4.0, 2.6)
 """Width and height of a panel of a picture [inch]."""
 
 
 @dataclass(frozen=True)
 class Curve:
-    """A line, and the band between two others behind it; values that are not known are NaN."""
+    """A line with a band; unknown values are NaN."""
 
     label: str
     place: int
-    """Of its group among all, which decides its colour."""
+    """Index of its group, which sets the colour."""
     across: Values
     mean: Values
     low: Values
@@ -172,9 +172,9 @@ def _rows(path: Path) -> pd.DataFrame:
 
 
 def _suites(folder: Path) -> dict[str, dict[str, tuple[Values, Values, Values, Values]]]:
-    """By suite that sweeps the mass, and by error: masses, means, and both ends of the interval.
+    """Masses, means, and both ends of the interval, by suite that varies the mass and by error.
 
-    An error is no less than 0, nor is its interval; a mean over one trial has none, its ends are NaN.
+    Intervals of errors are clipped at 0; for a mean over one trial the ends are NaN.
     """
     rows = _rows(folder / "tables" / "summary.csv")
     if not {"suite", "case", "mass"} <= {*rows}:
@@ -193,12 +193,12 @@ def _suites(folder: Path) -> dict[str, dict[str, tuple[Values, Values, Values, V
 
 
 def _numbers(rows: pd.DataFrame, name: str) -> Values:
-    """A column; NaN where a cell holds no number, or there is no such column."""
+    """A column as numbers; NaN for other cells or a missing column."""
     return np.asarray(pd.to_numeric(rows.get(name, pd.Series(np.nan, rows.index)), errors="coerce"), np.float64)
 
 
 def _thinned(across: Values, values: Values, most_points: int) -> tuple[Values, Values]:
-    """A curve of few points: means of neighbours, without what is missing."""
+    """A curve reduced to `most_points` means of neighbours, without missing values."""
     known = np.isfinite(values)
     across, values = across[known], values[known]
     if len(values) <= most_points:
@@ -219,5 +219,5 @@ def _joined(curves: Sequence[tuple[Values, Values]]) -> tuple[Values, Values, Va
 
 
 def _plain(values: Values) -> list[float | None]:
-    """Numbers for JSON, of six digits; what is no number is left out of a line."""
+    """Numbers for JSON, rounded to six digits; None for non-finite values."""
     return [float(f"{value:.6g}") if np.isfinite(value) else None for value in values]

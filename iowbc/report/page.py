@@ -1,4 +1,4 @@
-"""The page itself: one HTML file with everything in it, which asks no network for anything."""
+"""The report page: one self-contained HTML file without network access."""
 
 import base64
 import secrets
@@ -72,7 +72,7 @@ def write_page(
 
 
 def _numbered(curves: dict[str, CurvePanel], panels: Sequence[CurvePanel]) -> list[str]:
-    """Names of panels on the page, which are added to its curves."""
+    """Add panels to the page's curves; returns their names."""
     names = [f"curve{len(curves) + place}" for place in range(len(panels))]
     curves.update(zip(names, panels, strict=True))
     return names

@@ -21,7 +21,7 @@ from iowbc.results.picture import COLOURS
 ORDERS = 30.0
 """Ratio of the largest to the smallest value from which an axis is logarithmic."""
 VALUES_NAMED = 8
-"""Different values of a setting up to which each is named beside its axis."""
+"""Maximum number of distinct values of a setting that are all labelled on its axis."""
 AXIS_WIDTH = 1.9
 """Distance of two axes [inch]."""
 
@@ -36,7 +36,7 @@ class Line:
     halves: Mapping[str, float]
     """Half the interval of each mean; NaN where there is none."""
     runs: Sequence[Mapping[str, float]]
-    """The same of each run alone."""
+    """Outcomes of each single run."""
 
 
 @dataclass(frozen=True)
@@ -45,13 +45,13 @@ class AxisScale:
 
     name: str
     height: Callable[[JsonValue], float]
-    """Place of a value; NaN for none."""
+    """Position of a value on the axis; NaN if it has none."""
     marks: Sequence[tuple[float, str]]
-    """Heights that are named, and how."""
+    """Positions and texts of labels."""
 
 
 def parallel_coordinates(settings: Sequence[str], outcomes: Sequence[str], lines: Sequence[Line], title: str) -> Figure:
-    """Axes for the settings, then for the outcomes: means thick with their intervals as bars, single runs thin."""
+    """Axes for settings, then outcomes; thick lines: means, bars: their intervals, thin lines: single runs."""
     scales = [_setting(name, lines) for name in settings] + [_outcome(name, lines) for name in outcomes]
     figure = Figure(figsize=(max(6.0, AXIS_WIDTH * len(scales) + 1.0), 4.6), layout="constrained")
     axes = figure.subplots()
@@ -131,7 +131,7 @@ def _numbers(name: str, values: Sequence[float], *, named: bool) -> AxisScale:
 
 
 def _colours(figure: Figure, axes: Axes, lines: Sequence[Line], outcomes: Sequence[str]) -> Sequence[object]:
-    """A colour a line: its own, or, of many, by the last outcome."""
+    """A colour per line: from the palette, or for many lines by the last outcome."""
     if len(lines) <= len(COLOURS) or not outcomes:
         return [COLOURS[place % len(COLOURS)] for place in range(len(lines))]
     last = [line.means.get(outcomes[-1], math.nan) for line in lines]

@@ -1,4 +1,4 @@
-"""Runs side by side: those that differ in their seed alone belong together."""
+"""Comparison of runs, with those that differ only in their seed in one group."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -27,11 +27,11 @@ class Run:
     recipe: Mapping[str, Any] = field(default_factory=dict)
     """Resolved; empty for a single artifact."""
     shipped: Mapping[str, Artifact] = field(default_factory=dict)
-    """By stage: what came with the repository under the recipe's name, where it has used nothing else yet."""
+    """Published artifacts of the recipe for stages without an own artifact, by stage."""
 
     @property
     def usable(self) -> dict[str, Artifact]:
-        """By stage: all that there is to play or to take along."""
+        """All artifacts, own and published, by stage."""
         return {**self.shipped, **self.artifacts}
 
 
@@ -66,7 +66,7 @@ class MetricRow:
     cells: tuple[Cell, ...]
     """A mean with half the spread over the seeds, a cell for each group; empty where it has none."""
     deltas: tuple[str, ...]
-    """Of each further group to the first."""
+    """Difference of each further group from the first."""
     differs: bool
 
 
@@ -85,7 +85,7 @@ def grouped(runs: Sequence[Run]) -> list[Group]:
 
 
 def metric_rows(groups: Sequence[Group]) -> list[MetricRow]:
-    """Every metric of every stage, those of a stage together."""
+    """Every metric of every stage, grouped by stage."""
     found: dict[str, dict[str, None]] = {}
     for run in (run for group in groups for run in group.runs):
         for stage, artifact in run.artifacts.items():
@@ -117,8 +117,8 @@ def _cell(values: NDArray[np.float64]) -> Cell:
 
 
 def _of_one_variant(first: Run, second: Run) -> bool:
-    """True where two runs differ in their seeds alone: their recipes, or, where both are evaluated, what decided their
-    artifacts, which says the same of recipes that were written down by different versions of the program."""
+    """True if two runs differ only in their seeds: in their recipes or, if both are evaluated, in the ingredients of
+    their artifacts' keys, which also match for recipes recorded by different versions of the program."""
     recipe = _seedless(first.recipe)
     if recipe and recipe == _seedless(second.recipe):
         return True

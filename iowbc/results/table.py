@@ -19,9 +19,9 @@ LATEX_SIGNS = str.maketrans(
     {"±": r"$\pm$", "–": "--", "≥": r"$\geq$", "μ": r"$\mu$", "·": r"$\cdot$", "Δ": r"$\Delta$", "<": "$<$"}
 )
 NARROWEST = 20
-"""Characters that a folded name has room for at least."""
+"""Minimum width of a wrapped name [characters]."""
 NAMES = 1
-"""The column whose names may go on in the next line."""
+"""Index of the column whose names may wrap."""
 
 
 @dataclass(frozen=True)
@@ -31,10 +31,10 @@ class Column:
     name: str
     unit: str = ""
     latex: str = ""
-    """Its head in LaTeX, where it is another one."""
+    """Heading in LaTeX, if different."""
     role: Literal["own", "paper", "detail"] = "own"
-    """The paper's figures, or a detail that other columns nearly tell; narrow terminals leave these
-    out first."""
+    """`paper`: the paper's values; `detail`: nearly redundant with other columns. Narrow terminals leave both out
+    first."""
 
     @property
     def head(self) -> str:
@@ -67,14 +67,14 @@ class Table:
     numbers: Any = Field(default=None, exclude=True, repr=False)
     """The same figures as numbers, a pandas DataFrame, for the CSV."""
     grouped: bool = True
-    """True where the first column groups rows that repeat it."""
+    """True if rows with the same first column form a group."""
 
     @property
     def head(self) -> tuple[str, ...]:
         return tuple(column.head for column in self.columns)
 
     def texts(self, intervals: bool = True) -> list[list[str]]:
-        """The cells as text, with or without intervals; what groups rows stands in the first of them."""
+        """The cells as text, with or without intervals; a group's name appears only in its first row."""
         found = [
             [cell if isinstance(cell, str) else str(cell) if intervals else cell.value + cell.note for cell in row]
             for row in self.rows
@@ -89,14 +89,14 @@ STORED = TypeAdapter(Table)
 
 
 def heads(*names: str | Column) -> tuple[Column, ...]:
-    """Columns, of which those with nothing but a name are given as texts."""
+    """Columns; one that has only a name may be given as text."""
     return tuple(Column(name) if isinstance(name, str) else name for name in names)
 
 
 def measured(
     value: float, half: float = np.nan, form: str = ".3f", half_form: str = ".3f", note: str = "", none: str = ABSENT
 ) -> Cell:
-    """A mean with half its interval; the mean alone without one, and `none` where there is no mean."""
+    """A cell with a mean and half its interval; only the mean if `half` is NaN, `none` if the mean is NaN."""
     if np.isnan(value):
         return none
     return MeanCell(f"{value:{form}}", f"{half:{half_form}}", note) if np.isfinite(half) else f"{value:{form}}"
@@ -153,15 +153,15 @@ def read_tables(folder: Path) -> list[Table]:
 
 
 def drawn(table: Table, width: int) -> Group:
-    """A table of at most so many characters, below the first words of its caption.
+    """A table for a terminal of `width` characters, below the first words of its caption.
 
-    Numbers stay whole; the names in the second column are folded. What does not fit even so goes in this order: the
-    paper's figures, the intervals, columns from the right, of which details go first.
+    Names in the second column are wrapped. If that does not suffice, these are left out in order: the paper's values,
+    intervals, detail columns, other columns from the right.
     """
     shown, rows = list(range(len(table.columns))), table.texts()
 
     def widths() -> tuple[int, int]:
-        """Characters that the table takes on one line a row, and by how many its names can be folded."""
+        """Width of the table with one line per row, and the part of it that wrapping names can save [characters]."""
         found = [max(map(cell_len, [table.head[place], *(row[place] for row in rows)])) for place in shown]
         return sum(width + 2 for width in found), max([0, *(width - NARROWEST for width in found[NAMES : NAMES + 1])])
 

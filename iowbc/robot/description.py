@@ -1,4 +1,4 @@
-"""What the rest of the package knows of a robot: its joints, branches, gains, limits and named frames."""
+"""Description of a robot: its joints, branches, gains, limits and named frames."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -36,7 +36,7 @@ class Robot:
     waist: Indices
     """Places of the joints from base to torso, in that order, among the support joints."""
     waist_pitch: Indices
-    """Those of them that turn about y."""
+    """Those of `waist` that turn about y."""
     lateral: Indices
     """Places of joints that do not turn about the lateral axis, among the support joints: height and torso pitch are
     reached without them."""
@@ -95,13 +95,13 @@ def robot_folder(name: str) -> Path:
 
 
 def robot_folders() -> dict[str, Path]:
-    """The folder of every robot that a name finds, alphabetically."""
+    """Folders of the known robots by name, alphabetically."""
     found = {path.parent.name: path.parent for root in reversed(_roots()) for path in root.glob(f"*/{DESCRIPTION}")}
     return dict(sorted(found.items()))
 
 
 def _roots() -> list[Path]:
-    """Where robots are looked for, the first place first."""
+    """Search path of robots, highest precedence first."""
     package = Path(__file__).resolve().parents[1]
     return [Path.cwd() / "robots", package.parent / "robots", package / "robots"]
 

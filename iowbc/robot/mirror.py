@@ -31,16 +31,16 @@ class MirrorMap:
         return len(self.permutation)
 
     def as_float32(self) -> "MirrorMap":
-        """The same map for arrays of float32, which it then leaves so."""
+        """The same map for float32 arrays, whose type it keeps."""
         return MirrorMap(self.permutation, self.sign.astype(np.float32))
 
 
 Kind = Callable[[Robot], MirrorMap]
-"""What an array is when seen in a mirror, whatever the robot."""
+"""Function that makes an array's mirror map for a robot."""
 
 
 def in_place(*sign: float) -> Kind:
-    """Entries that stay where they are and change sign or not."""
+    """Mirror that keeps the order of the entries and multiplies them by signs."""
     return lambda robot: MirrorMap(np.arange(len(sign)), np.array(sign))
 
 
@@ -54,7 +54,7 @@ roll_and_pitch = in_place(*AXIAL_SIGN[:2])
 
 
 def polar_vector_each_side(robot: Robot) -> MirrorMap:
-    """Two polar vectors, left and right, which change places, (6,)."""
+    """Two polar vectors, left and right, which are swapped, (6,)."""
     return MirrorMap(np.array([3, 4, 5, 0, 1, 2]), np.tile(VECTOR_SIGN, 2))
 
 
@@ -78,7 +78,7 @@ def joint_mirror(robot: Robot) -> MirrorMap:
 
 
 def joint_magnitude(robot: Robot) -> MirrorMap:
-    """Mirror of what joints have without a direction, as their torque limits, in MJCF order, shape (..., joints)."""
+    """Mirror of joint quantities without a direction, such as torque limits, in MJCF order, shape (..., joints)."""
     places = joint_mirror(robot).permutation
     return MirrorMap(places, np.ones(len(places)))
 

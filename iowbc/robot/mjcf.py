@@ -12,7 +12,7 @@ from iowbc.files import read_limited
 from iowbc.robot import rotations
 
 LARGEST_FILE = 1_000_000
-"""Bytes of the largest file of a robot that is read."""
+"""Largest size of a robot's files [bytes]."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Capsule:
 
 @dataclass(frozen=True)
 class Body:
-    """A body, its place in the parent's frame, and what hangs on it."""
+    """A body, its place in the parent's frame, and what is attached to it."""
 
     name: str
     parent: str | None
@@ -101,7 +101,7 @@ class Tree:
         return tuple(body.hinge for body in self.chain(end, start) if body.hinge is not None)
 
     def mover(self, name: str) -> Body:
-        """The nearest body, from one inward, that moves on a hinge, or the root: what the body is fixed to."""
+        """The nearest body with a hinge: the body itself or an ancestor; the root if there is none."""
         body = self.bodies[name]
         while body.hinge is None and body.parent is not None:
             body = self.bodies[body.parent]
@@ -137,12 +137,12 @@ class Tree:
 
 
 def small_text(path: Path) -> str:
-    """Text of one of a robot's files. Raises OSError, or ValueError for what is none of their kind or size."""
+    """Text of one of a robot's files. Raises OSError, or ValueError for a file of another kind or too large."""
     return read_limited(path, LARGEST_FILE).decode("utf-8")
 
 
 def read_tree(path: Path) -> Tree:
-    """Reads an MJCF that stands alone, with its numbers on the elements themselves (classes decide contact and look).
+    """Reads a self-contained MJCF, with its numbers on the elements themselves (classes decide contact and look).
 
     Raises OSError, or ValueError with what is wrong.
     """

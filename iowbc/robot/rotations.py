@@ -11,7 +11,7 @@ NEXT = np.array([1, 2, 0])
 
 
 def cross(a: Array, b: Array) -> Array:
-    """a × b, shapes (..., 3): z, x and y of it from the components of a and b in order and those that follow."""
+    """a × b, shapes (..., 3): computed in the order z, x, y, then reordered."""
     before = a * b.take(NEXT, axis=-1)
     before -= a.take(NEXT, axis=-1) * b
     return before.take(NEXT, axis=-1)

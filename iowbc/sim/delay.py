@@ -1,4 +1,4 @@
-"""A line of past values that is read some fraction of periods back."""
+"""Delay line: past values, read at a latency of any number of periods, also fractional."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ class DelayLine:
     """The last values of a vector in n environments; each reads with its own latency, interpolated between periods."""
 
     def __init__(self, n: int, width: int, longest: float) -> None:
-        """`longest`: largest latency that can be asked for [periods]."""
+        """`longest`: largest latency that can be set [periods]."""
         self._length = int(np.ceil(longest)) + 2
         self._values = np.zeros((self._length, n, width))
         self._newest = np.zeros(1, np.int64)
@@ -29,7 +29,7 @@ class DelayLine:
         self._point(which)
 
     def _point(self, which: Indices) -> None:
-        """Writes down, for every place of the newest value, where some environments read: the value seen, and the one
+        """Precomputes where some environments read, for every place of the newest value: the value seen and the one
         before it."""
         seen = (np.arange(self._length)[:, None] - self._whole[which]) % self._length
         n = len(self._whole)
@@ -37,7 +37,7 @@ class DelayLine:
         self._places[1][:, which] = (seen - 1) % self._length * n + which
 
     def fill(self, which: Indices, value: Array) -> None:
-        """Makes `value` (k, width) the whole past of some environments."""
+        """Fills the whole history of some environments with `value` (k, width)."""
         self._values[:, which] = value
 
     def push(self, value: Array) -> None:
@@ -59,7 +59,7 @@ class DelayLine:
         return self._seen
 
     def restored(self) -> None:
-        """To be called after the memory was written from outside."""
+        """Must be called after the arrays were overwritten."""
         self._point(np.arange(len(self._whole)))
 
     def arrays(self) -> dict[str, Array]:

@@ -37,7 +37,7 @@ class Disturbance:
         self._next[which] = self._wait(random.absorb(key, self._count[which]))
 
     def _wait(self, blow: Keys) -> Indices:
-        """Steps to the next blow, (k,), by the keys of the last ones; before the first that of the count zero."""
+        """Steps to the next disturbance, (k,), from the keys of the last ones; the first has count zero."""
         seconds = random.draw(blow, f"{self._name}/interval", self._interval)[:, 0]
         return np.maximum(np.round(seconds / self._period), self._length).astype(np.int64)
 

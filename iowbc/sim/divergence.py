@@ -42,7 +42,7 @@ class Divergence:
 
 
 def replay(robot: Robot, recipe: Recipe, divergence: Divergence, timing: Timing) -> bool:
-    """Whether the recorded period diverges again; it does, with the same physics and robot."""
+    """Repeats the recorded period. True if it diverges again, as it does with the same physics and robot."""
     scene, arrays = getattr(recipe.scenes, divergence.scene), divergence.arrays
     world = World(robot, recipe.physics, scene, np.zeros(1, np.int64), timing)
     world.restore({name: values[None] for name, values in arrays.items()})

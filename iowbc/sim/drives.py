@@ -1,4 +1,4 @@
-"""What the motors can give: drawn strength, less at speed, and what two joints of one linkage share."""
+"""Torque limits of the motors: drawn strength, reduced at high speed, shared by the two joints of a linkage."""
 
 import numpy as np
 
@@ -17,7 +17,7 @@ class Drives:
         """Torque limit of each motor or linkage in these episodes at low speed, (n, joints) [N·m]."""
         self._slope = 1.0 / ((1.0 - physics.torque_corner) * robot.velocity_limit)
         self._at_rest = self._slope * robot.velocity_limit
-        """What a motor could give at rest as a multiple of its limit."""
+        """Torque at rest, extrapolated from the slope, as a multiple of the limit."""
         self._kp, self._kd = robot.kp[robot.linkages], robot.kd[robot.linkages]
         self._range = np.zeros((n, len(robot.joints), 2))
 
@@ -28,12 +28,12 @@ class Drives:
         self.effort[which[:, None, None], pairs] = together[..., None]
 
     def ranges(self, target: Array, state: SimulationState) -> Array:
-        """Least and greatest torque of each motor over the period to come, (n, joints, 2) [N·m]; `target` (n, joints)
+        """Least and greatest torque of each motor over the next period, (n, joints, 2) [N·m]; `target` (n, joints)
         [rad].
 
         A motor that drives gives its full torque up to a corner speed and less beyond, down to nothing at its no-load
         speed; a motor that brakes gives all. The joints a, b of a linkage are moved by two motors together:
-        |τ_a| + |τ_b| ≤ the linkage's limit, shared as the joint control asks for it.
+        |τ_a| + |τ_b| ≤ the linkage's limit, split by what the joint control demands.
         """
         effort = self.effort.copy()
         self._share(effort, target, state)

@@ -1,4 +1,4 @@
-"""Draws what is random in an episode."""
+"""Draws the random quantities of an episode."""
 
 from collections.abc import Mapping
 
@@ -27,7 +27,7 @@ WITH_OBJECT = (
 
 
 class DrawTable:
-    """Distributions side by side, a column each number; drawn in one sweep, for many small draws cost more."""
+    """Distributions side by side, one column per number; drawn at once, which is faster than many small draws."""
 
     def __init__(self, entries: Mapping[str, tuple[Distribution, int]]) -> None:
         """`entries`: distribution and width of each quantity by name."""
@@ -99,7 +99,7 @@ class Draws:
         self._lightest = recipe.randomization.object_mass_scale.low
 
     def draw(self, which: Indices, key: Keys, fixed: Mapping[str, Array]) -> None:
-        """Draws anew for some environments, from the keys of their episodes; `fixed` (n,) holds values, NaN draws."""
+        """Draws quantities of some environments from their episodes' keys; `fixed` (n,): values to hold, NaN draws."""
         values = self.values
         for name in SWITCHES:
             values[name][which] = 1.0
@@ -133,7 +133,7 @@ class Draws:
         values["slip_force"][which] = values["surface_friction"][which] * self._strength[which]
 
     def _draw_uncommon(self, row: Array, key: Keys) -> None:
-        """Makes objects light and both latencies long in a part of the episodes; rows (k, width)."""
+        """Makes objects light and both latencies long in a share of the episodes; rows (k, width)."""
         settings = self.recipe.randomization
         if not settings.enabled or not (settings.light_share or settings.slow_share):
             return
@@ -171,7 +171,7 @@ def _entries(recipe: Recipe, robot: Robot) -> dict[str, tuple[Distribution, int]
 
 
 def _habits(partner: PartnerSettings) -> dict[str, tuple[Distribution, int]]:
-    """What is drawn of behaviours; a table of their own, so that they leave all other draws as they are."""
+    """Distributions of the partner's behaviours, in a separate table, so that they do not change the other draws."""
     sections = {"leader": partner.leader, "stopping": partner.stopping}
     return {
         f"{section}_{name}": (value, 1)

@@ -27,10 +27,10 @@ class Grip:
         self.angle, self.rate = np.zeros(count), np.zeros(count)
 
     def twist(self, mass: Array, slip_force: Array, connected: Array) -> Array:
-        """Torque of the hands on the object over the period to come, (n, 3) [N·m].
+        """Torque of the hands on the object over the next period, (n, 3) [N·m].
 
-        `mass` (n,) with whose inertia the object moves [kg]; `slip_force` (n,) of each hand [N]; `connected` (n, 2): 1
-        for hands that hold.
+        `mass` (n,): inertial mass of the object [kg]; `slip_force` (n,) of each hand [N]; `connected` (n, 2): 1 for
+        hands that hold.
         """
         hands = self._sites[:, self._layout.grips]
         axis = hands[:, 0] - hands[:, 1]
@@ -47,7 +47,7 @@ class Grip:
         most = 2.0 * self._grasp.torsion * slip_force * holding
         reach = most / np.maximum(stiffness, TINY)
         self.angle.clip(-reach, reach, out=self.angle)
-        lag = 0.5 * self._period * stiffness  # a held torque lags half a period and would drive what it should damp
+        lag = 0.5 * self._period * stiffness  # a held torque lags half a period, which would excite the swing
         damping = np.minimum(self._grasp.swing_damping * inertia + lag, stable)
         size = (stiffness * self.angle + damping * rate).clip(-most, most)
         return axis * -size[:, None]
@@ -57,10 +57,10 @@ class Grip:
 
 
 class Squeeze:
-    """Adds to the joint targets what makes the motors press with a force f: τ = Jᵀ f, target += τ / kp."""
+    """Adds offsets to the joint targets so that the motors press with a force f: τ = Jᵀ f, target += τ / kp."""
 
     def __init__(self, robot: Robot, batch: Any, places: str, hands: slice | Indices) -> None:
-        """`places`: the field of MuJoCo's data where the points lie with which `hands` press."""
+        """`places`: field of MuJoCo's data that holds the points with which `hands` press."""
         self._hands, self._arms = hands, as_slice(robot.interaction)
         self._hinges = as_slice(robot.interaction + 1)
         self._anchor, self._axis, self._place = batch.bind("xanchor"), batch.bind("xaxis"), batch.bind(places)

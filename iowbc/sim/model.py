@@ -15,9 +15,9 @@ GROUND = "ground"
 """Name of its geom."""
 GROUND_BIT = 1
 FORCE, NET_FORCE = 1 << mujoco.mjtConDataField.mjCONDATA_FORCE.value, 3
-"""What a contact sensor of MuJoCo delivers: the force alone, summed over all contacts."""
+"""Output of MuJoCo's contact sensors: the force alone, summed over all contacts."""
 LEG_BITS = (8, 16)
-"""What left and right leg are; each touches the other."""
+"""Contact bits of left and right leg; each touches the other."""
 ARENA = 2 << 20
 """Memory for contacts and constraints of one simulation [bytes]; twenty contacts take a tenth of it."""
 
@@ -28,8 +28,8 @@ HOLDING = ("wrist", "elbow")
 """Parts of the names of bodies that hold an object."""
 
 INTEGRATORS = {"implicit": mujoco.mjtIntegrator.mjINT_IMPLICITFAST, "explicit": mujoco.mjtIntegrator.mjINT_EULER}
-"""MuJoCo's implicit integrator takes the motors' velocity feedback into its step; under Euler it is a force of the
-state before the step, as that of a controller on the robot is."""
+"""MuJoCo's implicit integrator takes the motors' velocity feedback into its step; under Euler it is a force computed
+from the state before the step, like that of a controller on the robot."""
 SOLVERS = {"newton": mujoco.mjtSolver.mjSOL_NEWTON, "cg": mujoco.mjtSolver.mjSOL_CG}
 CONES = {"pyramidal": mujoco.mjtCone.mjCONE_PYRAMIDAL, "elliptic": mujoco.mjtCone.mjCONE_ELLIPTIC}
 
@@ -102,7 +102,7 @@ def require_stable(model: Any, robot: Robot, timing: Timing) -> None:
     """Raises ValueError where joint damping, computed from the state before a physics step, passes 1 as kd dt / I: a
     speed would then change sign at every step.
 
-    I: inertia that the joint feels with all others free, 1 / (M⁻¹)_jj, in the default posture.
+    I: effective inertia of the joint with all others free, 1 / (M⁻¹)_jj, in the default posture.
     """
     data = mujoco.MjData(model)
     count = len(robot.joints)
@@ -123,7 +123,7 @@ def require_stable(model: Any, robot: Robot, timing: Timing) -> None:
 
 def _add_motors(spec: Any, robot: Robot, timing: Timing) -> None:
     """torque = kp (target - position) - kd velocity, within the effort limit; motor i drives joint i. Each keeps its
-    past targets, of which it may follow an earlier one."""
+    past targets, so that it can follow a delayed one."""
     for index, joint in enumerate(robot.joints):
         kp, kd, effort = float(robot.kp[index]), float(robot.kd[index]), float(robot.effort[index])
         spec.add_actuator(
@@ -141,7 +141,7 @@ def _add_motors(spec: Any, robot: Robot, timing: Timing) -> None:
 
 
 def _touches(geom: Any, shape: bool, body_contact: str) -> tuple[int, int]:
-    """Contact bits of a link's geom: what it is and what it touches; `shape`: it is one to collide with.
+    """Contact bits of a link's geom: its own and those it touches; `shape`: whether it is a collision shape.
 
     Hands and forearms hold the object with palms or grips, and do not touch it themselves.
     """

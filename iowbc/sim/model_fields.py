@@ -18,7 +18,7 @@ FIELDS = (
 )
 """Model fields that differ between simulations."""
 WHEELS = ("tendon_frictionloss", "tendon_damping", "wrap_prm")
-"""Those of a crate's wheels."""
+"""Further fields that differ for a crate's wheels."""
 
 
 class ModelFields:
@@ -30,9 +30,9 @@ class ModelFields:
         self._fields = {name: batch.expand(name) for name in names}
         self._nominal = {name: field[0].copy() for name, field in self._fields.items()}
         self.body_mass: Array = self._fields["body_mass"]
-        """Inertia in translation, (n, bodies) [kg]."""
+        """Inertial masses, (n, bodies) [kg]."""
         self.object_mass = self._fields["object_mass"] = np.zeros(len(self.body_mass))
-        """Mass that gravity acts on, (n,) [kg]; a light object moves with more (`body_mass`)."""
+        """Gravitational mass, (n,) [kg]; the inertial one of a light object (`body_mass`) is larger."""
         self.torque_range: Array = self._fields["actuator_forcerange"]
         """Least and greatest torque of each motor, (n, joints, 2) [N·m]; to be written."""
         self.rolling = [self._fields[name] for name in names if name in WHEELS]
@@ -45,7 +45,7 @@ class ModelFields:
         self._yielding = batch.expand("tendon_invweight0") if scene.kind == "push" else None
 
     def write(self, ids: Indices, drawn: Mapping[str, Array]) -> None:
-        """Sets the models of simulations `ids`, which rise, from rows of drawn values in the same order."""
+        """Sets the models of simulations `ids`, in ascending order, from rows of drawn values in the same order."""
         links, speeds = self._layout.links, self._layout.joint_speeds
         fields, nominal = self._fields, self._nominal
         mass = drawn["link_mass_scale"]
@@ -65,7 +65,7 @@ class ModelFields:
         self._derive(ids)
 
     def _derive(self, ids: Indices) -> None:
-        """What follows from the fields; wheels give way alike in whatever direction they were turned last."""
+        """Recomputes derived constants; the compliance of wheels does not depend on their last direction."""
         self._batch.set_const(ids)
         if self._yielding is not None:
             self._yielding[ids] = 1.0 / self.body_mass[ids, self._layout.object][:, None]
@@ -84,7 +84,7 @@ class ModelFields:
             fields["geom_friction"][ids[:, None], self._layout.palms, 1] = self._scene.grasp.torsion * friction
 
     def place_grips(self, ids: Indices, places: Array) -> None:
-        """Where on the object the grips are connected, (k, 2, 3), object frame [m]."""
+        """Sets the connection points of the grips on the object, (k, 2, 3), object frame [m]."""
         self._fields["site_pos"][ids[:, None], self._layout.object_grips] = places
 
     def fit_width(self, ids: Indices, width: Array) -> None:

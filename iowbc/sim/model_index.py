@@ -1,4 +1,4 @@
-"""Where things lie in a compiled model."""
+"""Indices into a compiled model."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -50,13 +50,13 @@ class ModelIndex:
     momentum: Indices
     """Entries of the inertia matrix that couple the base's translation to the robot's other velocities, (3, speeds)."""
     momentum_speeds: slice
-    """Those velocities in qvel."""
+    """The velocities of `momentum` in qvel."""
     past_forces: slice
-    """What MuJoCo remembers of each hand, in the history: two counters, times and forces, those of a period."""
+    """Entries of each hand in MuJoCo's history: two counters, then times and forces of a control period."""
     past_ground: slice
-    """The same of the ground's force on each foot."""
+    """The same for the ground's force on each foot."""
     past_targets: slice
-    """What MuJoCo remembers of each motor, the first in its history: two counters, times, past targets."""
+    """Entries of each motor, the first in MuJoCo's history: two counters, times, past targets."""
     object_geom: int | None
     """Geom with which the object touches palms."""
 

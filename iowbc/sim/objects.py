@@ -13,11 +13,11 @@ from iowbc.sim.timing import Timing
 
 OBJECT_BIT = 4
 HANDS = ("left_hand", "right_hand")
-"""Bodies without mass at the grip points, through which all passes between the hands and an object."""
+"""Bodies without mass at the grip points, through which all forces between hands and object pass."""
 WEIGHTLESS = 1e-9
 """Mass [kg] and inertia [kg·m²] of those bodies."""
 OFF_CENTRE = [0.001, 0.001, 0.001]
-"""Centre of mass before one is drawn [m]; off the centre, or else the compiler hard-codes that it is there."""
+"""Centre of mass before one is drawn [m]; off the centre, because the compiler hard-codes a centred one."""
 PALM_CONDIM = 4
 """Palms resist sliding and twisting."""
 RING_SEGMENTS = 16
@@ -69,7 +69,7 @@ def add_object(
 
 
 def _add_hands(spec: Any, robot: Robot, timing: Timing) -> None:
-    """The hands, each with a sensor of the force that passes through it, which keeps those of a control period."""
+    """The hands, each with a sensor of the force that passes through it, with a history of one control period."""
     for name, wrist, place in zip(HANDS, robot.wrist_bodies, robot.grip_offset, strict=True):
         inertial = {"mass": WEIGHTLESS, "inertia": [WEIGHTLESS] * 3}
         hand = spec.body(wrist).add_body(name=name, pos=place, explicitinertial=True, **inertial)
@@ -84,7 +84,7 @@ def _add_hands(spec: Any, robot: Robot, timing: Timing) -> None:
 
 
 def _add_grips(spec: Any, body: Any, scene: Scene) -> None:
-    """A compliant point connection of each grip; its place on the object is set when that is put between the hands."""
+    """A compliant point connection of each grip; its place on the object is set at each reset."""
     for side, hand, sign in (("left", HANDS[0], 1.0), ("right", HANDS[1], -1.0)):
         site = body.add_site(name=f"object_{side}_grip", pos=[0.0, sign * 0.15, scene.grasp.height], group=4)
         spec.add_equality(

@@ -1,8 +1,8 @@
 """The second carrier: a spring, a damper and a preload at the object's far handle, on a path of its own.
 
-The path is that of the command, integrated from where the episode began, and changed by the partner's behaviour; a
-follower goes where the handle goes. A steered partner has a velocity of its own instead, and turns the object. All is
-real sums, products and roots, which round alike however many environments there are; NumPy's complex products do not.
+The path is that of the command, integrated from the start of the episode, and changed by the partner's behaviour; a
+follower moves with the handle. A steered partner has a velocity of its own instead, and turns the object. All
+arithmetic is real: the rounding of NumPy's complex products depends on the number of environments.
 """
 
 import numpy as np
@@ -19,13 +19,13 @@ from iowbc.sim.shapes import measured
 from iowbc.sim.state import SimulationState
 
 NOISE_WIDTH = 3
-"""Columns of noise that the partner takes each step: two of its unsteady force, one of its share."""
+"""Noise columns that the partner uses per step: two for its unsteady force, one for its share."""
 FEED = 4
 """Entries of the command that the partner receives: v_x, v_y, yaw rate, height."""
 SLOW = 0.1
-"""Speed below which a follower pushes a crate the less, the slower it rolls [m/s]."""
+"""Speed of a crate below which a follower's push fades out [m/s]."""
 HESITANT = 0.03
-"""Speed below which a steered partner pushes a crate the less, the slower it wants it to roll [m/s]."""
+"""Speed set for a crate below which a steered partner's push fades out [m/s]."""
 PATH, FOLLOWER, LEADER, STOPPING, TUGGING, LAGGING = range(len(BEHAVIOURS))
 REMEMBERED = (
     *("stiffness", "damping", "weight", "resistance", "bound", "pace", "gust", "drift", "share", "wandering"),
@@ -56,9 +56,8 @@ class Partner:
         self._resistance, self._bound, self._pace, self._gust = np.zeros(n), np.zeros(n), np.ones(n), np.zeros(n)
         self._drift, self._share, self._wandering = np.zeros(n), np.zeros(n), np.zeros(n)
         self.steered = np.zeros(n, np.bool_)
-        """Partners whose feed is their own: velocity of the handle in the frame of the heading at the start, yaw rate
-        of the object, and height of the handle from any origin; from the next reset on, (n,). Not part of
-        snapshots."""
+        """Partners with a feed of their own: velocity of the handle in the frame of the heading at the start, yaw rate
+        of the object, and height of the handle from any origin; from the next reset on, (n,). Not part of snapshots."""
         self.loose = np.zeros(n, np.bool_)
         """Steered partners that exert no horizontal force: they bear their share and follow the handle, (n,). Not part
         of snapshots."""
@@ -72,7 +71,7 @@ class Partner:
         self._behaviour, self._steps, self._attention = np.zeros(n), np.zeros(n, np.int64), np.ones(n)
         self._turning, self._sideways, self._rise = np.zeros(n), np.zeros(n), np.zeros(n)
         self._stop, self._halted = np.zeros((n, 2)), np.zeros(n)
-        """Begin and end of a stop [s]; part of the commanded velocity that remains in it."""
+        """Begin and end of a stop [s]; fraction of the commanded velocity that remains during it."""
         self._followed, self._slow = np.zeros((n, 2)), np.full(n, TINY)
         self._turn_rate, self._own_way = np.zeros(n), np.zeros((n, 2))
         self._keep = float(np.exp(-period / recipe.noise_time))
@@ -138,7 +137,7 @@ class Partner:
         self._line.set_latency(which, np.where(lags, self._recipe.lagging.delay, delay) / self._period)
 
     def _derive(self) -> None:
-        """What follows from the shares and behaviours that were drawn."""
+        """Recomputes values derived from the drawn shares and behaviours."""
         self._any, self._steers = bool(self._present.any()), bool(self.steered.any())
         there = self._present > 0.0
         self._which = [np.flatnonzero(there & (self._behaviour == kind)) for kind in range(len(BEHAVIOURS))]
@@ -146,7 +145,7 @@ class Partner:
         self._least, self._most = np.minimum(0.0, sign), np.maximum(0.0, sign)
 
     def wrench(self, commanded: Array, gust: Array, state: SimulationState, out: Array) -> None:
-        """Force and torque about the object's centre of mass, written to `out` (n, 6), of the period to come.
+        """Force and torque about the object's centre of mass, written to `out` (n, 6), for the next period.
 
         `commanded` (n, 4): v_x, v_y and yaw rate in the heading frame, height of the hands [m]; `gust` (n, 3) standard
         normal. F = k (aim - handle) + c (v_aim - v_handle), bounded, plus the share of the weight upward or of the
@@ -156,7 +155,7 @@ class Partner:
         state.partner_share[:] = self._share * self._present
         if not self._any:
             return
-        self._wandering *= self._keep_share  # the share wanders about the drawn one, between zero and one
+        self._wandering *= self._keep_share  # AR(1) noise about the drawn share, within 0..1 (-1..0 if negative)
         self._wandering += self._drift * gust[:, 2]
         state.partner_share[:] = (self._share + self._wandering).clip(self._least, self._most) * self._present
         velocity = self._path(commanded)
@@ -254,8 +253,8 @@ class Partner:
         velocity[resumed, :2] += (self._at - self._aim)[resumed, :2] / self._recipe.stopping.catching_up
 
     def _follow(self, which: Indices, velocity: Array) -> None:
-        """Lets the aim of followers (k,) go with the handle: the handle's low-passed velocity, and the distance from
-        where it was a period ago over the reaction time, so that a steady motion leaves no distance."""
+        """Moves the aim of followers (k,) with the handle: at its low-passed velocity, plus the distance to its place a
+        period ago over the reaction time, so that a steady motion leaves no error."""
         attention = self._attention[which, None]
         followed = self._followed[which] + attention * (self._speed[which, :2] - self._followed[which])
         away = (self._at - self._aim)[which, :2] - followed * self._period
@@ -319,7 +318,7 @@ class Partner:
         return own | {f"line/{name}": values for name, values in self._line.arrays().items()}
 
     def restored(self) -> None:
-        """To be called after the memory was written from outside."""
+        """Must be called after the arrays were overwritten."""
         self._derive()
         self._line.restored()
 

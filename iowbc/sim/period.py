@@ -1,4 +1,4 @@
-"""What is given to the physics for one control period."""
+"""Inputs of the physics for one control period."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
@@ -35,5 +35,5 @@ class Period:
 
     @classmethod
     def alone(cls, arrays: Mapping[str, Array]) -> Self:
-        """Inverse of `of`, for a simulation of that one environment; other entries are passed over."""
+        """Inverse of `of`, for a simulation of that one environment; other entries are ignored."""
         return cls(**{field.name: arrays[field.name][None] for field in fields(cls)})

@@ -1,9 +1,9 @@
-"""Dry friction of a crate's wheels: alike in every direction, and coupled with its turning.
+"""Dry friction of a crate's wheels: isotropic, and coupled with its yaw.
 
-Three tendons without elasticity lie along orthonormal directions of the space of (x, y, arm · yaw); each control period
-turns them. With w the crate's velocity there, friction is -R w / |w| (an ellipsoidal limit surface, Goyal et al. 1991),
-whose exact linearisation is dry friction R along w and damping R / |w| across it. A crate at rest sticks along the
-force on it up to R.
+Three tendons without elasticity lie along orthonormal directions of the space of (x, y, arm · yaw); they are
+re-oriented in each control period. With w the crate's velocity there, friction is -R w / |w| (an ellipsoidal limit
+surface, Goyal et al. 1991), whose exact linearisation is dry friction R along w and damping R / |w| across it. A crate
+at rest sticks along the force on it up to R.
 """
 
 from typing import Any
@@ -33,11 +33,11 @@ class Rolling:
         self._place, self._centre = batch.bind("xpos"), batch.bind("xipos")
         self._scale = np.array([1.0, 1.0, self._arm])
         self.touch = np.zeros((len(self._velocity), 6))
-        """Torque about the centre of mass and force of what touches the crates, (n, 6)."""
+        """Contact wrench on the crates: torque about the centre of mass, and force, (n, 6)."""
 
     def turn(self, resistance: Array, wrench: Array) -> None:
-        """Directs friction over the period to come: `resistance` (n,) [N]; `wrench` (n, 6) that is applied to the crate
-        beside what touches it, about its centre of mass [N, N·m]."""
+        """Directs friction over the next period: `resistance` (n,) [N]; `wrench` (n, 6): applied to the crate in
+        addition to contacts, about its centre of mass [N, N·m]."""
         moving = self._velocity[:, self._speeds] * self._scale
         speed = np.sqrt(np.vecdot(moving, moving))
         slides = speed > self._slow
@@ -52,11 +52,11 @@ class Rolling:
         damping[:, 1:] = np.where(slides, resistance / np.maximum(speed, self._slow), 0.0)[:, None]
 
     def observe(self, wrench: Array) -> None:
-        """Remembers what touched the crates at the end of a period in which `wrench` (n, 6) was applied."""
+        """Stores the contact wrench at the end of a period in which `wrench` (n, 6) was applied."""
         np.subtract(self._external[:, self._thing], wrench[:, TORQUE_FIRST], out=self.touch)
 
     def _push(self, wrench: Array) -> Array:
-        """Force on the crates but that of their wheels, and its torque about the vertical by the arm, (n, 3) [N]."""
+        """Force on the crates without that of their wheels, and its vertical torque over the arm, (n, 3) [N]."""
         force = self.touch + wrench[:, TORQUE_FIRST]
         lever = self._centre[:, self._thing] - self._place[:, self._thing]
         pushed: Array = force[:, 3:].copy()

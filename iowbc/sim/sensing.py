@@ -1,4 +1,4 @@
-"""What the sensors deliver: the truth with bias, noise and latency."""
+"""Sensor model: the true state with bias, noise and latency."""
 
 import numpy as np
 
@@ -14,14 +14,14 @@ SPEED, TURNING = slice(7, 10), slice(10, 13)
 OBJECT_WIDTH = 13
 NOT_SEEN = np.zeros(OBJECT_WIDTH)
 NOT_SEEN[ORIENTATION.start] = 1.0
-"""What is delivered without an object: identity, at rest at the base."""
+"""Measurement without an object: identity, at rest at the base."""
 CONJUGATE_PLACES = np.array([0, 1, 2, 3, 1, 0, 3, 2, 2, 3, 0, 1, 3, 2, 1, 0])
 CONJUGATE_SIGNS = np.array([1, 1, 1, 1, -1, 1, 1, -1, -1, -1, 1, 1, -1, 1, -1, 1.0])
-"""The matrix, row by row, with which the conjugate of a quaternion multiplies another from the left."""
+"""Matrix, row by row, of the left multiplication by a quaternion's conjugate."""
 
 
 class Columns:
-    """Where the measurements of a robot with some number of joints lie in a row, before those of the object."""
+    """Columns of a robot's measurements in a row, before those of the object."""
 
     def __init__(self, joints: int) -> None:
         self.position, self.velocity = slice(0, joints), slice(joints, 2 * joints)
@@ -39,7 +39,7 @@ class Sensing:
         n, self._period = len(has_object), period
         self._columns = columns = Columns(joints)
         self.noise_width = columns.width
-        """Columns of noise that sensing takes each step."""
+        """Noise columns that sensing uses per step."""
         self._see_object, self._all_see = bool(has_object.any()), bool(has_object.all())
         self._world = np.zeros((n, 3, 3))
         width = columns.robot.stop
@@ -66,7 +66,7 @@ class Sensing:
         )
 
     def reset(self, which: Indices, drawn: dict[str, Array], state: SimulationState) -> None:
-        """Fills the past of some environments with their present."""
+        """Fills the delay lines of some environments with their current state."""
         self._bias[which] = drawn["encoder_bias"][which]
         roll, pitch = drawn["imu_tilt"][which].T
         self._mounting[which] = rotations.matrix(rotations.from_euler(roll, pitch, np.zeros_like(roll)))
@@ -81,7 +81,7 @@ class Sensing:
         self._object_line.fill(which, self._object[which])
 
     def advance(self, state: SimulationState) -> None:
-        """Takes in the state after a period."""
+        """Adds the state after a period to the delay lines."""
         self._drifted += self._drift * self._period
         self._sense(state)
         self._robot_line.push(self._robot)
@@ -105,7 +105,7 @@ class Sensing:
         quaternion /= np.sqrt(np.vecdot(quaternion, quaternion))[:, None]
 
     def _sense(self, state: SimulationState) -> None:
-        """Reads the truth. The heading goes on past a half turn, for the delay line interpolates."""
+        """Computes measurements without noise and latency; the heading is unwrapped for the delay line."""
         robot, thing, columns = self._robot, self._object, self._columns
         robot[:, columns.position] = state.joint_position
         robot[:, columns.velocity] = state.joint_velocity
@@ -135,7 +135,7 @@ class Sensing:
             thing[~state.has_object] = NOT_SEEN
 
     def restored(self) -> None:
-        """To be called after the memory was written from outside."""
+        """Must be called after the arrays were overwritten."""
         self._robot_line.restored()
         self._object_line.restored()
 

@@ -14,11 +14,11 @@ from iowbc.recipe.simulation.scene import Object
 from iowbc.robot import rotations
 
 SMALLEST, LARGEST = 1e-3, 10.0
-"""Edges of a mesh, at least and at most [m]: what two hands can hold, or push, with room for a mistake."""
+"""Smallest and largest extent of a mesh [m]: what two hands can hold or push, with a margin."""
 HOLE = 0.55
 """Inner radius of a tyre as a part of its outer one."""
 HULL = mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
-"""A mesh weighs as its convex hull does: that is what touches, and it is closed whatever the file says."""
+"""A mesh has the mass and inertia of its convex hull, which is the collision shape and always closed."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Shape:
     low: Array
     """Corner of the box around it with the least coordinates, (3,) [m]."""
     high: Array
-    """That with the greatest, (3,) [m]."""
+    """Corner with the greatest coordinates, (3,) [m]."""
     principal: Array
     """Principal moments of inertia for unit mass, (3,) [m²]."""
     about_axes: Array
@@ -36,14 +36,14 @@ class Shape:
     turn: Array = field(default_factory=lambda: np.array([1.0, 0.0, 0.0, 0.0]))
     """Quaternion of the principal axes in the frame, (4,)."""
     vertices: Array = field(default_factory=lambda: np.zeros((0, 3)))
-    """Of a mesh, (n, 3) [m]."""
+    """Vertices of a mesh, (n, 3) [m]."""
     faces: Array = field(default_factory=lambda: np.zeros((0, 3), np.int32))
     """Triangles, by the numbers of their vertices, (m, 3)."""
 
 
 @functools.cache
 def measured(thing: Object) -> Shape:
-    """The shape of an object. Raises UsageError for a mesh that is none."""
+    """The shape of an object. Raises UsageError for an invalid mesh."""
     if thing.mesh is not None:
         return _of_mesh(thing.mesh, thing.scale)
     half = 0.5 * np.asarray(thing.size)
@@ -65,7 +65,7 @@ def _inertia(shape: str, x: float, y: float, z: float) -> Array:
 
 
 def _of_mesh(mesh: MeshFile, scale: float) -> Shape:
-    """What MuJoCo makes of a file: the convex hull, which is what touches, gives mass and inertia."""
+    """The shape of a file, by MuJoCo: mass and inertia are those of the convex hull, the collision shape."""
     spec = mujoco.MjSpec()
     name = f"mesh{mesh.path[mesh.path.rindex('.') :].lower()}"
     spec.assets = {name: mesh.unpacked()}

@@ -31,7 +31,7 @@ STARTS_AT_ZERO = (
     *("joint_acceleration", "slipped", "partner_force", "partner_velocity", "partner_energy", "partner_share"),
     *("external_force", "push_force"),
 )
-"""Parts of the state that an episode begins without."""
+"""Fields of the state that are zero at the start of an episode."""
 
 
 class Simulation:
@@ -49,12 +49,12 @@ class Simulation:
         control_frequency: float = 50.0,
         drake: Drake | None = None,
     ) -> None:
-        """`envs`: global indices of the environments, (n,); with `seed` (one, or one each) they key all that is random.
+        """`envs`: global indices of the environments, (n,); with `seed` (one, or one each) they key all random draws.
 
         `scenes`: name of each environment's scene. `fixed`: quantities held at a value, not drawn, (n,); NaN draws.
-        `drake`: settings with which Drake takes the steps, not MuJoCo; raises UsageError where it is not installed.
+        `drake`: settings of Drake as the physics engine; raises UsageError if it is not installed.
         """
-        mujoco.set_mju_user_warning(lambda message: None)  # prints and logs nothing: they are read from their counters
+        mujoco.set_mju_user_warning(lambda message: None)  # no printing: warnings are read from their counters
         self.robot, self.recipe = robot, recipe
         self.envs = np.asarray(envs, np.int64)
         self.n = n = len(self.envs)
@@ -77,7 +77,7 @@ class Simulation:
             self._owner[world.rows], self._index[world.rows] = number, np.arange(len(world.rows))
         self._draws = Draws(recipe, models, robot)
         self.drawn = self._draws.values
-        """Everything that is random in the current episodes, by name, (n,) or (n, k)."""
+        """Random quantities of the current episodes, by name, (n,) or (n, k)."""
         self.hold(fixed or {})
         self._key = random.environment_key(seed, self.envs)
         self._episode_key = self._key.copy()
@@ -88,9 +88,9 @@ class Simulation:
         self.target = np.tile(robot.default_position, (n, 1))
         self.feed = np.zeros((n, partner.FEED))
         self.planned_push = np.zeros((n, 3))
-        """Force on the base in the period to come beside the drawn pushes, world frame, (n, 3) [N]."""
+        """Force on the base in the next period in addition to the drawn pushes, world frame, (n, 3) [N]."""
         self.planned_impulse = np.zeros((n, 3))
-        """The same on the object's centre of mass, beside the drawn impulses, (n, 3) [N]."""
+        """The same on the object's centre of mass, in addition to the drawn impulses, (n, 3) [N]."""
         self.partner = partner.Partner(recipe.partner, models, self.period)
         self._sensing = Sensing(
             recipe.sensing, len(robot.joints), self.state.has_object, recipe.randomization.longest_latency, self.period
@@ -118,18 +118,18 @@ class Simulation:
 
     @property
     def infeasible(self) -> NDArray[np.bool_]:
-        """Where a crate resists more than the friction between feet and ground can push against, (n,)."""
+        """Whether a crate's rolling resistance exceeds the friction between feet and ground, (n,)."""
         hold = self.drawn["ground_friction"] * self._robot_mass * GRAVITY
         return self.drawn["rolling_resistance"] > hold
 
     @property
     def disturbed(self) -> NDArray[np.bool_]:
-        """Where an impulse or a push acts in this control period, (n,)."""
+        """Whether an impulse or a push acts in this control period, (n,)."""
         return np.logical_or(self._impulses.force.any(axis=1), self._pushes.force.any(axis=1))
 
     @property
     def soles(self) -> dict[str, Array]:
-        """What the left and right sole do, by name, (n, 2) each; see `iowbc.sim.soles.Soles`."""
+        """Motion and contact of the left and right sole, by name, (n, 2) each; see `iowbc.sim.soles.Soles`."""
         parts = [(world.place, world.soles.arrays()) for world in self.worlds]
         gathered = {name: np.empty((self.n, 2)) for name in parts[0][1]}
         for place, arrays in parts:
@@ -138,8 +138,8 @@ class Simulation:
         return gathered
 
     def hold(self, fixed: Mapping[str, Array], which: Indices | slice = EVERY) -> None:
-        """Holds quantities of some environments at values (k,) from the next reset on; NaN draws. Keeps what is held
-        and not named here."""
+        """Holds quantities of some environments at values (k,) from the next reset on; NaN draws. Other held quantities
+        stay held."""
         unknown = [name for name in fixed if name not in self.drawn]
         if unknown:
             raise KeyError(f"no randomised quantities {unknown}; there are: {', '.join(sorted(self.drawn))}")
@@ -161,10 +161,9 @@ class Simulation:
     ) -> None:
         """Starts new episodes: draws what is random, puts the robot on its soles and the object into its hands.
 
-        `which` (k,); `joint_position` (k, joints) [rad]; `base_pitch` (k,) [rad], zero by default; `yaw` (k,)
-        [rad], drawn by default; `key` (k,) of all that is random in the episodes, by default the next of each
-        environment. The height of the base follows from kinematics: the lowest corner of the soles touches
-        the ground.
+        `which` (k,); `joint_position` (k, joints) [rad]; `base_pitch` (k,) [rad], zero by default; `yaw` (k,) [rad],
+        drawn by default; `key` (k,): random keys of the episodes, by default the next of each environment. The height
+        of the base follows from kinematics: the lowest corner of the soles touches the ground.
         """
         which = np.asarray(which, np.int64)
         if len(which) == 0:
@@ -242,8 +241,8 @@ class Simulation:
         self._deliver()
 
     def _hand_over(self, wrench: Array) -> None:
-        """Bears at first the robot's part of a held object's weight between its hands, less and less:
-        f = (1 - share) m g (1 - t / T)."""
+        """Supports the robot's share of a held object's weight between the hands, fading out over T: f = (1 - share) m
+        g (1 - t / T)."""
         if (self.clock < self._handover).any():
             left = np.maximum(self._handover - self.clock, 0.0) / np.maximum(self._handover, 1.0)
             drawn, lifted = self.drawn, np.zeros((self.n, 3))
@@ -258,7 +257,7 @@ class Simulation:
         self._sensing.deliver(self._noise[:, : self._sensing.noise_width])
 
     def _parts(self, which: Indices) -> Iterator[tuple[World, Indices, Indices]]:
-        """Worlds that some environments belong to, with their indices in the world, rising, and in `which`."""
+        """Worlds that some environments belong to, with their indices in the world, ascending, and in `which`."""
         order = np.argsort(which)
         owner = self._owner[which[order]]
         for number, world in enumerate(self.worlds):
@@ -267,8 +266,8 @@ class Simulation:
                 yield world, self._index[which[chosen]], chosen
 
     def _squeeze(self) -> Array:
-        """Force with which the arms press each hand against a held object, (n,) [N]: always the same where friction
-        alone holds it, else what friction needs for the palms' part of the load they bore last."""
+        """Force with which the arms press each hand against a held object, (n,) [N]: constant where friction alone
+        holds it, else what friction needs for the palms' part of their last load."""
         needed = self._by_friction * self._borne / np.maximum(self.drawn["surface_friction"], TINY)
         return self._pressed + np.minimum(needed, self._strength)
 
@@ -287,7 +286,7 @@ class Simulation:
             )
 
     def _memory(self) -> dict[str, Array]:
-        """Every array that the future depends on, besides the worlds'."""
+        """State arrays, without those of the worlds."""
         own: dict[str, Array] = {"episode": self.episode, "clock": self.clock, "episode_key": self._episode_key}
         own |= {"target": self.target, "feed": self.feed, "robot_mass": self._robot_mass, "borne": self._borne}
         own["noise"] = self._noise
@@ -304,7 +303,7 @@ class Simulation:
         return own | {f"{part}/{name}": values for part, arrays in parts.items() for name, values in arrays.items()}
 
     def snapshot(self) -> dict[str, Array]:
-        """Copies of everything that the future depends on, a row an environment; `restore` continues bit for bit."""
+        """Copies of the complete state, one row per environment; `restore` continues bit for bit."""
         saved = {name: values.copy() for name, values in self._memory().items()}
         for index, world in enumerate(self.worlds):
             saved |= {f"world{index}/{name}": values for name, values in world.snapshot().items()}
@@ -312,7 +311,7 @@ class Simulation:
 
     def restore(self, rows: Mapping[str, Array]) -> None:
         """Inverse of `snapshot`, into a simulation of the same robot, recipe, environments and scenes; other entries
-        are passed over."""
+        are ignored."""
         saved = by_world(rows, self._scenes)
         self.hold({name.removeprefix("fixed/"): values for name, values in saved.items() if name.startswith("fixed/")})
         for name, values in self._memory().items():

@@ -1,7 +1,7 @@
-"""A simulation's arrays with a row an environment, whichever environments share its process.
+"""Snapshots of a simulation, one row per environment, independent of the distribution over processes.
 
 A simulation keeps arrays by world (the environments of one scene) and delay lines as rings of values. In a snapshot
-worlds go by the name of their scene (`scene/...`), and rings begin with their newest value (`ring/...`).
+worlds are named after their scene (`scene/...`), and rings begin with their newest value (`ring/...`).
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,7 +15,7 @@ RINGS = ("sensing/robot/values", "sensing/object/values", "partner/line/values")
 
 
 def by_environment(arrays: Mapping[str, Array], scenes: Sequence[str]) -> dict[str, Array]:
-    """Arrays of a simulation with a row an environment in every one; `scenes`: names of its worlds, in order."""
+    """Arrays of a simulation, each with one row per environment; `scenes`: names of its worlds, in order."""
     rows: dict[str, Array] = {}
     for name, values in arrays.items():
         if name in RINGS:
@@ -30,7 +30,7 @@ def by_environment(arrays: Mapping[str, Array], scenes: Sequence[str]) -> dict[s
 
 
 def by_world(rows: Mapping[str, Array], scenes: Sequence[str]) -> dict[str, Array]:
-    """Inverse of `by_environment`; other entries are passed over."""
+    """Inverse of `by_environment`; other entries are ignored."""
     arrays: dict[str, Array] = {}
     for name, values in rows.items():
         kind, _, rest = name.partition("/")

@@ -1,4 +1,4 @@
-"""What the soles do on the ground; computed in trials alone."""
+"""Motion and contact of the soles; computed in trials only."""
 
 from typing import Any
 
@@ -27,7 +27,7 @@ class Soles:
         self._normals, self._distances = half_planes(robot.sole_polygon)
 
     def arrays(self) -> dict[str, Array]:
-        """Everything by name, (n, 2) each."""
+        """All quantities by name, (n, 2) each."""
         loaded, pressure = self._pressure()
         return {
             "foot_slide": self._slide(loaded, pressure),
@@ -55,7 +55,7 @@ class Soles:
     def _slide(self, loaded: Array, pressure: Array) -> Array:
         """Horizontal speed at the centres of pressure [m/s]; zero in the air.
 
-        A foot that rolls over its edge does not slide: there its centre of pressure rests.
+        A foot that rolls over its edge does not slide: its centre of pressure is at rest.
         """
         velocity = self._velocity(pressure)
         return np.hypot(velocity[..., 0], velocity[..., 1]) * loaded

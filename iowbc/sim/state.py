@@ -10,8 +10,8 @@ from iowbc.arrays import Array, Mask
 
 @dataclass(frozen=True)
 class SimulationState:
-    """The truth after a control period, in arrays that are overwritten. World frame unless said otherwise; quaternions
-    wxyz.
+    """The true state after a control period, in arrays that are overwritten. World frame unless said otherwise;
+    quaternions wxyz.
 
     Forces, torques, accelerations are those of the last physics step; all else is of the state that it led to.
     """
@@ -35,7 +35,7 @@ class SimulationState:
     joint_torque: Array
     """Torque of the motors, (n, joints) [N·m]."""
     torque_limit: Array
-    """What they could have given in that direction in this control period, (n, joints) [N·m]."""
+    """Torque limits of the motors in that direction in this control period, (n, joints) [N·m]."""
     saturation: Mask
     """Motors at that limit, (n, joints)."""
     torso_rotation: Array
@@ -47,7 +47,7 @@ class SimulationState:
     foot_position: Array
     """Sole centres, left and right, (n, 2, 3) [m]."""
     foot_velocity: Array
-    """Of the sole centres, (n, 2, 3) [m/s]."""
+    """Velocity of the sole centres, (n, 2, 3) [m/s]."""
     foot_force: Array
     """Contact force of the ground on each foot, (n, 2, 3) [N]."""
     foot_contact: Mask
@@ -59,7 +59,7 @@ class SimulationState:
     object_quaternion: Array
     """(n, 4); identity without an object."""
     object_linear_velocity: Array
-    """Of the object's centre, (n, 3) [m/s]."""
+    """Velocity of the object's centre, (n, 3) [m/s]."""
     object_angular_velocity: Array
     """(n, 3) [rad/s]."""
     grasped: Mask
@@ -69,7 +69,7 @@ class SimulationState:
     grip_force: Array
     """Force of the object on each hand, (n, 2, 3) [N]."""
     hand_weight_share: Array
-    """Vertical force of the hands on a held object as a part of its weight, (n,); zero with nothing to hold."""
+    """Vertical force of the hands on a held object as a fraction of its weight, (n,); zero with nothing to hold."""
     link_object_force: Array
     """Size of the force of links other than the hands, or of the ground, on the object, (n,) [N]."""
     partner_force: Array
@@ -77,7 +77,7 @@ class SimulationState:
     partner_velocity: Array
     """Velocity that the partner intends for the handle, (n, 3) [m/s]; zero without a partner."""
     handle_velocity: Array
-    """Of the object's far handle, where a partner takes hold, (n, 3) [m/s]; zero without an object."""
+    """Velocity of the object's far handle, which a partner holds, (n, 3) [m/s]; zero without an object."""
     partner_share: Array
     """Share of the weight, or in a push of the rolling resistance, that the partner bears at the time, (n,)."""
     partner_energy: Array

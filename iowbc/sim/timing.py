@@ -1,4 +1,4 @@
-"""How physics steps, control periods and the longest latency fit together."""
+"""Relation of physics steps, control periods and the longest latency."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from iowbc.arrays import Array
 
 
 class Timing:
-    """Physics steps in a control period, and how many of them past targets are kept."""
+    """Numbers of physics steps in a control period and of past targets to keep."""
 
     def __init__(self, period: float, timestep: float, longest_latency: int) -> None:
         """`period` of control and `timestep` of physics [s]; `longest_latency` [control periods]."""
@@ -20,11 +20,11 @@ class Timing:
 
     @property
     def kept_targets(self) -> int:
-        """Targets that are remembered: one a physics step of the longest latency, and the newest."""
+        """Number of targets to keep: one per physics step of the longest latency, and the newest."""
         return self.substeps * self.longest_latency + 1
 
     def delay(self, latency: Array) -> Array:
-        """Time by which MuJoCo holds targets back for a latency [control periods], of any shape [s].
+        """Delay of targets in MuJoCo for a latency [control periods], any shape [s].
 
         A whole number of physics steps, less half of one: targets are read by time, and times are rounded.
         """

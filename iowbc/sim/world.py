@@ -30,7 +30,7 @@ NOTHING = mujoco.mjtStage.mjSTAGE_NONE.value
 MOTION_ALONE = sum(
     getattr(mujoco.mjtDisableBit, f"mjDSBL_{part}").value for part in ("CONTACT", "CONSTRAINT", "SENSOR", "ACTUATION")
 )
-"""What MuJoCo leaves out where positions, velocities and inertia of the bodies are all that is wanted."""
+"""Flags that disable all of MuJoCo but positions, velocities and inertia of the bodies."""
 EVERY = slice(None)
 """All simulations."""
 FEET, HANDS, THING = slice(0, 2), slice(2, 4), 4
@@ -44,9 +44,9 @@ PRESSED = 0.001
 class World:
     """n simulations of one scene, and their place among all environments.
 
-    One `mjData` for all of them, which stays in the processor's cache. To compute positions and velocities of the new
-    state once for the observation, without contacts and constraints, and once more in the next step costs less than an
-    `mjData` per simulation, which could keep them, but comes from memory every time.
+    All share one `mjData`, which stays in the processor's cache. Positions and velocities of a new state are computed
+    twice: for the observation, without contacts and constraints, and in the next step. That costs less than an `mjData`
+    per simulation, which could keep them but is fetched from memory every time.
     """
 
     def __init__(self, robot: Robot, physics: Physics, scene: Scene, rows: Indices, timing: Timing) -> None:
@@ -91,7 +91,7 @@ class World:
         self._mass_cache()
 
     def _grasp(self, scene: Scene) -> tuple[Squeeze | None, Grip | None]:
-        """What arms and palms do to hold an object, beside their connection or the contact with it."""
+        """Forces of arms and palms on a held object, besides their connection or contact with it."""
         if scene.kind != "lift" or scene.object is None:
             return None, None
         if self.layout.palms is not None:
@@ -106,9 +106,9 @@ class World:
         self._object_part = (thing / (thing + self.robot_mass))[:, None]
 
     def reset(self, ids: Indices, joint_position: Array, pitch: Array, yaw: Array, drawn: Mapping[str, Array]) -> None:
-        """Robot in the posture, lowest sole corner on the ground; object in the hands or crate before them.
+        """Robot in the posture, lowest sole corner on the ground; object in the hands or crate in front of them.
 
-        `ids` (k,) rise; all else has a row for each.
+        `ids` (k,) in ascending order; all else has a row for each.
         """
         self.batch.reset(ids, stage=NOTHING)
         self.fields.write(ids, drawn)
@@ -186,7 +186,7 @@ class World:
             self._rolling.observe(given.wrench)
 
     def _keep(self, ids: Indices | slice = EVERY) -> None:
-        """Takes over the forces that MuJoCo computed last for some simulations."""
+        """Copies the last forces that MuJoCo computed for some simulations."""
         self._torque[ids] = self._last_torque[ids]
         self._external[ids] = self._last_external[ids].take(self._touched, axis=1)
 
@@ -199,7 +199,7 @@ class World:
             self._flags[:] = self._whole
 
     def _handle(self, given: Period, thing: int) -> None:
-        """What acts on the object, and between it and the hands."""
+        """Applies the forces on the object, and between it and the hands."""
         layout, applied = self.layout, self._applied
         inertia = self.fields.body_mass[:, thing]
         applied[:, thing] = given.wrench
@@ -232,13 +232,13 @@ class World:
         self._keep(ids)
 
     def record(self, index: int) -> dict[str, Array]:
-        """What a simulation was at the start of the last control period: its state row and its model's own fields."""
+        """State row and model fields of a simulation at the start of the last control period."""
         kept = {name: values[index] for name, values in self._memory.items()}
         return kept | {"state": self.before[index]} | self.fields.of(index)
 
     def release(self, state: SimulationState, slip_force: Array) -> None:
-        """Lets go the hands whose grip carried more than its slip force, (all environments,) [N], at any physics step
-        of the period."""
+        """Releases hands whose grip carried more than its slip force, (all environments,) [N], at any physics step of
+        the period."""
         if self.scene.kind == "free":
             return
         load = np.vecdot(self._past_forces, self._past_forces).max(axis=2)
@@ -309,7 +309,7 @@ class World:
         self._gather_load(state, thing)
 
     def _gather_load(self, state: SimulationState, thing: int) -> None:
-        """Forces of hands and of other links on the object: what neither hands nor partner and impulses exert."""
+        """Forces of hands and of other links on the object; the latter are all but hands, partner and impulses."""
         place = self.place
         grip = self._external[:, HANDS, 3:]
         state.grip_force[place] = grip
@@ -326,12 +326,12 @@ class World:
         return self._sites[:, self.layout.grips]
 
     def snapshot(self) -> dict[str, Array]:
-        """Everything that the next step depends on."""
+        """Complete state of the simulations."""
         own = {name: array.copy() for name, array in self._memory.items()}
         return own | {"state": self.batch.state.copy(), "warnings": self._warnings.copy()} | self.fields.snapshot()
 
     def restore(self, values: Mapping[str, Array]) -> None:
-        """Inverse of `snapshot`, or of `record` for all; the simulations then take bit for bit the same course."""
+        """Inverse of `snapshot`, or of `record` for all; the simulations then continue bit for bit."""
         self.fields.restore(values)
         for name, array in self._memory.items():
             array[...] = values[name]
@@ -344,8 +344,8 @@ class World:
 def make_world(
     robot: Robot, physics: Physics, scene: Scene, rows: Indices, timing: Timing, drake: Drake | None
 ) -> World:
-    """The environments of a scene, stepped by MuJoCo, or with settings by Drake. Raises UsageError where that is not
-    installed: it is an extra."""
+    """The environments of a scene, stepped by Drake if its settings are given, else by MuJoCo. Raises UsageError if
+    Drake, an extra, is not installed."""
     if drake is None:
         return World(robot, physics, scene, rows, timing)
     try:

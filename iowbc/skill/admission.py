@@ -1,4 +1,4 @@
-"""Admission of transport tasks: a task is one where two are needed, and where they need to heed each other."""
+"""Admission of transport tasks: a task must need two agents that respond to each other."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,23 +12,23 @@ from iowbc.skill.plan import ABSENT, CLOCK, Plan, Rule
 from iowbc.task.specification import Specification
 
 SOLVED, UNSOLVED = 0.8, 0.2
-"""Success of the reference pair, at least, and of a lone robot, at most: four of five trials."""
+"""Lowest success rate of the reference pair, and highest of a lone or passive robot."""
 DRAGGED = 1.5
-"""Partner force with a passive robot that succeeds, at least, in parts of the reference pair's: a controller that
-yields lets itself be led while it is commanded to stand, and only the force shows that it does not help."""
+"""Least ratio of the partner force with a passive robot to that of the reference pair at which the passive robot may
+succeed. A compliant controller can be led while commanded to stand; only the force shows that it does not help."""
 PAIRS: dict[str, tuple[str, Rule]] = {
     "reference": ("path", "lead"),
     "lone robot": (ABSENT, "lead"),
     "passive robot": ("path", "stand"),
     "ignoring": (CLOCK, "clock"),
 }
-"""Scripted pairs: human and nominal command. The reference pair knows the path and heeds the object; the ignoring pair
-walks the path by the clock, each at its own pace."""
+"""Scripted pairs: human and nominal command. The reference pair knows the path and reacts to the object; in the
+ignoring pair, each walks the path by the clock at its own pace."""
 
 
 @dataclass(frozen=True)
 class Admission:
-    """How scripted pairs fare at a task: means over trials by pair, in the order of `PAIRS`."""
+    """Results of scripted pairs in a task: means over trials by pair, in the order of `PAIRS`."""
 
     task: str
     success: dict[str, float]
@@ -38,7 +38,7 @@ class Admission:
 
     @property
     def problems(self) -> tuple[str, ...]:
-        """Why it is no task for two; empty where it is one."""
+        """Reasons to reject the task; empty if it is admitted."""
         found = []
         if self.success["reference"] < SOLVED:
             found.append(f"the reference pair solves {self.success['reference']:.0%}, expected {SOLVED:.0%} or more")
@@ -60,7 +60,7 @@ def admissions(
     workers: int,
     tasks: Sequence[str] = (),
 ) -> list[Admission]:
-    """Plays every task, or those named, with each scripted pair; `trials` of each, with the same seeds."""
+    """Runs every task, or only `tasks`, with each scripted pair: `trials` episodes each, with the same seeds."""
     names = tuple(tasks) or specification.recipe.skill.tasks.names
     plans = [
         Plan(name, human, True, seed=seed, rule=rule)

@@ -16,26 +16,26 @@ from iowbc.skill.situation import Situation, turned
 
 @dataclass(frozen=True)
 class ObjectMotion:
-    """Motion of the object, frame of the start."""
+    """Desired motion of the object, start frame."""
 
     velocity: Array
-    """Horizontal, (n, 2) [m/s]."""
+    """Horizontal velocity, (n, 2) [m/s]."""
     yaw_rate: Array
-    """Of the path at that speed, (n,) [rad/s]; without a correction of the yaw."""
+    """Yaw rate of the path at that speed, (n,) [rad/s], without yaw correction."""
     heading: Array
-    """Of the path, (n,) [rad]."""
+    """Heading of the path, (n,) [rad]."""
     height: Array
-    """Of the path a little ahead, (n,) [m]."""
+    """Height of the path a little ahead, (n,) [m]."""
 
 
 def pursue(settings: Pursuit, paths: Paths, now: Situation) -> ObjectMotion:
-    """v = v_0 min(1, way left / slowing) t - k e n, with the tangent t, the distance e from the path, its normal n."""
+    """v = v_0 min(1, remaining length / slowing) t - k e n: tangent t, normal n, distance e from the path."""
     speed = settings.speed * np.minimum(1.0, now.left / settings.slowing)
     return _along(settings, paths, now, now.covered, speed, -settings.lateral * now.lateral)
 
 
 def by_the_clock(settings: Pursuit, paths: Paths, now: Situation, seconds: Array, pace: Array | float) -> ObjectMotion:
-    """The path at a pace (n,) times the nominal speed, whatever the object does; `seconds` (n,) since the start."""
+    """Open-loop motion along the path at `pace` (n,) times the nominal speed; `seconds` (n,) since the start."""
     covered = settings.speed * pace * seconds
     speed = settings.speed * pace * (covered < paths.length[now.path])
     return _along(settings, paths, now, covered, speed, np.zeros(len(seconds)))
@@ -53,7 +53,7 @@ def _along(settings: Pursuit, paths: Paths, now: Situation, covered: Array, spee
 
 
 class NominalCommand(SkillCommand):
-    """Nominal commands of n games, (n, 11), of robots that know the path or follow."""
+    """Nominal commands of n robots, (n, 11), which know the path or follow."""
 
     def __init__(self, skill: Skill, commands: Commands, pushing: Mask) -> None:
         """`pushing`: games with a crate, (n,)."""
@@ -61,10 +61,10 @@ class NominalCommand(SkillCommand):
         self._pursuit = skill.pursuit
 
     def leading(self, wanted: ObjectMotion, now: Situation) -> Array:
-        """Commands that move the object as wanted: the base goes round the object's centre as it turns.
+        """Commands for the desired motion of the object; the base circles the object's centre as it turns.
 
-        v_base = v_object - ω × (object - base), in the heading frame. The hands rise by the height of the path, and
-        once more by what the object lacks of it.
+        v_base = v_object - ω × (object - base), in the heading frame. The hands rise by the path's height plus the
+        object's height error.
         """
         command = self.standing()
         rate = wanted.yaw_rate + self._pursuit.yaw * wrapped(wanted.heading - now.heading)
@@ -74,7 +74,7 @@ class NominalCommand(SkillCommand):
         command[:, 1] -= rate * arm[:, 0]
         command[:, YAW_RATE] = rate
         height, (low, high) = 2.0 * wanted.height - now.position[:, 2], self._commands.height
-        legs = (command[:, HEIGHT] + height * ~self._pushing).clip(low, high)  # as far as they go, then the arms
+        legs = (command[:, HEIGHT] + height * ~self._pushing).clip(low, high)  # as far as possible, then the arms
         rest = command[:, HEIGHT] + height * ~self._pushing - legs
         command[:, HEIGHT] = legs
         command[:, OFFSET][:, 2::3] += rest[:, None]
@@ -82,29 +82,29 @@ class NominalCommand(SkillCommand):
 
 
 class Human:
-    """Intentions of n humans: velocity of the handle (frame of the start), yaw rate, and height of the handle."""
+    """Intentions of n humans: velocity of the handle (start frame), yaw rate, and height of the handle."""
 
     def __init__(self, skill: Skill, n: int, period: float) -> None:
-        """`period`: of a control step [s]."""
+        """`period`: control period [s]."""
         self._settings, self._pursuit, self._period = skill.human, skill.pursuit, period
         self._velocity, self._height = np.zeros((n, 4)), np.zeros((n, 2))
-        """Velocity in space and yaw rate; height led to by the velocity, and its offset."""
+        """Velocity and yaw rate; height integrated from the velocity, and height offset."""
         self._offset = np.zeros(n)
 
     def start(self, which: Array) -> None:
-        """Forgets the past of some humans, (k,)."""
+        """Resets some humans, (k,)."""
         self._velocity[which], self._height[which], self._offset[which] = 0.0, 0.0, 0.0
 
     def of_action(self, action: Array, now: Situation) -> Array:
-        """Intentions that actions add to the script's, (n, 5): velocity in space [m/s], yaw rate [rad/s], offset of the
-        height [m]. `action` (n, 5) in [-1, 1]: velocity of the handle in the frame of the object's yaw, offset of its
-        height, yaw rate of the object."""
+        """Intentions that actions add to the script's, (n, 5): velocity [m/s], yaw rate [rad/s], height offset [m].
+        `action` (n, 5) in [-1, 1]: velocity of the handle in the frame of the object's yaw, height offset, yaw rate of
+        the object."""
         s = self._settings
         scaled = action * np.array([s.velocity, s.velocity, s.vertical_velocity, s.height, s.yaw_rate])
         return np.concatenate([turned(scaled[:, :3], now.yaw), scaled[:, 4:], scaled[:, 3:4]], axis=1)
 
     def of_script(self, wanted: ObjectMotion, now: Situation) -> Array:
-        """Intentions (n, 5) that move the object as wanted: the handle goes round its centre as it turns."""
+        """Intentions (n, 5) for the desired motion of the object; the handle circles its centre as it turns."""
         rate = wanted.yaw_rate + self._pursuit.yaw * wrapped(wanted.heading - now.yaw)
         arm = now.handle - now.position
         rise = (wanted.height - now.position[:, 2]) * self._pursuit.vertical
@@ -113,12 +113,12 @@ class Human:
         return np.stack([*columns, rise.clip(-limit, limit), rate, np.zeros(len(rate))], axis=1)
 
     def intend(self, intentions: Array) -> None:
-        """Takes over intentions (n, 5) until the next decision."""
+        """Sets intentions (n, 5) until the next decision."""
         self._velocity, self._offset = intentions[:, :4], intentions[:, 4]
 
     def reach(self, which: Mask, away: Array, now: Situation) -> None:
-        """Lets some humans, (n,), lead their springs to hands that are `away` (n, 3) [m] (frame of the start), no
-        faster than the human of the actions; they leave the object's yaw to the robot."""
+        """Moves the springs of some humans, (n,), towards hands at the offset `away` (n, 3) [m] (start frame), at most
+        as fast as the human agent. The object's yaw is left to the robot."""
         s = self._settings
         velocity, fastest = away / s.hand_time, self._pursuit.speed + s.velocity
         velocity[:, :2] *= fastest / np.linalg.norm(velocity[:, :2], axis=1).clip(fastest)[:, None]

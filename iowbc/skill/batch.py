@@ -1,4 +1,4 @@
-"""The games of one process: decisions of robot and human, control steps below them, rewards and endings."""
+"""Games of one process: decisions of robot and human, their control steps, rewards and endings."""
 
 from typing import TYPE_CHECKING
 
@@ -27,16 +27,16 @@ if TYPE_CHECKING:
 NO_LIMIT = 1e6
 """Time limit of the lower layer's episodes [s]: the game ends them."""
 UNDISTURBED = {"impulse_scale": 0.0, "push_scale": 0.0}
-"""The human is the disturbance."""
+"""No random disturbances: the human is the disturbance."""
 CORNERS = np.array([[1.0, 1.0], [1.0, -1.0], [-1.0, -1.0], [-1.0, 1.0]])
 ROBOT_ACTIONS, HUMAN_ACTIONS = 11, 5
 
 
 class GameBatch:
-    """n games. `reset` and `step` read the actions from the buffers and leave everything else there."""
+    """n games. `reset` and `step` read the actions from the buffers and write all results to them."""
 
     def __init__(self, setup: "GameSetup", first: int, last: int, buffers: Buffers) -> None:
-        """The games from `first` to `last`, the latter excluded; `buffers` hold their rows alone."""
+        """Games from `first` to `last` (excluded); `buffers` hold only their rows."""
         recipe, self._skill = setup.specification.recipe, setup.skill
         self.buffers, self._games, self._keys = buffers, np.arange(first, last), setup.keys(first, last)
         scenes, plans = setup.scenes[first:last], None if setup.plans is None else setup.plans[first:last]
@@ -47,7 +47,7 @@ class GameBatch:
         self.n = n = last - first
         period, own = self.lower.period, list(setup.tasks.values())
         self.substeps = round(1.0 / (self._skill.frequency * period))
-        """Control steps of a decision."""
+        """Control steps per decision."""
         worlds = [getattr(recipe.simulation.scenes, scene) for scene in scenes]
         self._pushing = np.array([world.kind == "push" for world in worlds])
         self._corners = np.array([shape_of(world.object).high[:2] for world in worlds])[:, None] * CORNERS
@@ -68,13 +68,13 @@ class GameBatch:
         self._action = {"robot": np.zeros((n, ROBOT_ACTIONS)), "human": np.zeros((n, HUMAN_ACTIONS))}
         self._costs, self._jerk = np.zeros((3, n)), np.zeros(n)
         self.hand = np.full((n, 3), np.nan)
-        """Where persons have their hands, which pull the handle there, world frame, (n, 3) [m]; NaN lets go."""
+        """Hand positions of persons, which pull the handle there, world frame, (n, 3) [m]; NaN lets go."""
         self.now: Situation
         """The games after the last control step."""
 
     def reset(self, seeds: Keys | None = None, agent_share: float = 0.0) -> None:
-        """Begins the first episode everywhere, the same one each time; with seeds (n,) all that is random starts anew
-        from them. `agent_share`: part of the drawn episodes from here on whose human is that of the actions."""
+        """Starts the first episode of every game, the same each time; seeds (n,) reseed all random draws.
+        `agent_share`: fraction of the sampled episodes from now on in which the human agent acts."""
         self.drawn.agent_share = agent_share
         if seeds is not None:
             self._keys = random.environment_key(seeds, np.zeros(self.n, np.int64))
@@ -86,7 +86,7 @@ class GameBatch:
         self._observe("now")
 
     def step(self) -> None:
-        """One decision of every game, with `substeps` control steps; those that end begin anew."""
+        """One decision of every game, with `substeps` control steps; ended games restart."""
         self.decide()
         for _ in range(self.substeps):
             self.control()
@@ -115,7 +115,7 @@ class GameBatch:
         self._costs += self._costs_now()
 
     def conclude(self) -> None:
-        """Reward and endings of the decision just made; begins anew where a game has ended."""
+        """Reward and endings of the decision; restarts ended games."""
         self._decisions += 1
         lower, buffers, held = self.lower, self.buffers, ~self._pushing
         force, wrists = self._hands.read(lower.simulation.measured.projected_gravity)
@@ -199,7 +199,7 @@ class GameBatch:
         return by_the_clock(self._skill.pursuit, self.paths, self.now, self._decisions / self._skill.frequency, pace)
 
     def _costs_now(self) -> Array:
-        """Internal force [N], size of the human's power beyond its share [W] and tilt [rad], (3, n)."""
+        """Internal force [N], absolute power of the human beyond its share [W] and tilt [rad], (3, n)."""
         state, drawn = self.lower.simulation.state, self.lower.simulation.drawn
         partner = state.partner_force
         robot = -state.grip_force.sum(axis=1)

@@ -1,4 +1,4 @@
-"""Figures of an episode: sums and extremes over its control steps, read when it ends."""
+"""Metrics of an episode: sums and extremes over its control steps, read at its end."""
 
 import numpy as np
 
@@ -14,12 +14,12 @@ FIGURES = (
     *("strayed", "diverged", "time_out", "covered", "reward", "known", "mass", "share"),
     *("task", "partner", "environment", "episode"),
 )
-"""Figures of an episode: seconds, metres, radians, newtons, joules; the largest tilt, means of the internal force and
-of the size of yaw and height error, seconds in a wall; task and partner by number."""
+"""Metrics of an episode in seconds, metres, radians, newtons and joules. Tilt is the largest; internal force and
+absolute yaw and height errors are means; `touched` is time in a wall [s]; task and partner are numbers."""
 
 
 class EpisodeFigures:
-    """Running figures of n games."""
+    """Running metrics of n games."""
 
     def __init__(self, n: int, longest: int) -> None:
         """`longest`: control steps of the longest episode."""
@@ -28,13 +28,13 @@ class EpisodeFigures:
         self._sum, self._most = np.zeros((n, 7)), np.zeros((n, 2))
 
     def start(self, which: Indices) -> None:
-        """Begins anew for some games, (k,)."""
+        """Resets some games, (k,)."""
         for values in (self._steps, self._sum, self._most):
             values[which] = 0
 
     def add(self, now: Situation, internal: Array, partner: Array, power: Array, loads: Array, period: float) -> None:
-        """Takes in a control step: internal force (n,) [N], the partner's horizontal force (n, 2) [N], the size of its
-        power beyond its share (n,) [W], and what robot and both bear, (n, 2)."""
+        """Adds a control step: internal force (n,) [N], the partner's horizontal force (n, 2) [N], its absolute power
+        beyond its share (n,) [W], and the loads on the robot and on both, (n, 2) [N]."""
         rows = np.arange(len(internal))
         self._force[rows, self._steps.clip(None, self._force.shape[1] - 1)] = np.linalg.norm(partner, axis=1)
         self._steps += 1
@@ -43,7 +43,7 @@ class EpisodeFigures:
         np.maximum(self._most, np.stack([np.abs(now.lateral), now.tilt], axis=1), out=self._most)
 
     def read(self, which: Indices, period: float) -> dict[str, Array]:
-        """Figures of some games, (k,), so far."""
+        """Metrics of some games, (k,), so far."""
         steps = np.maximum(self._steps[which], 1)
         square, yaw, height, internal, work, robot, both = self._sum[which].T
         forces = [self._force[row, :count] for row, count in zip(which, steps, strict=True)]

@@ -26,25 +26,25 @@ ROBOT, HUMAN = "robot", "human"
 COUNTED = ("success", "fallen", "dropped", "strayed", "diverged", "time_out", "known")
 
 NOMINAL = {ROBOT: None, HUMAN: None}
-"""The policies of `play_once` of a robot with its nominal command, and of a human of the actions who stands."""
+"""Policies for `play_once` with zero actions: nominal command of the robot, scripted intention of the human agent."""
 
 
 @dataclass(frozen=True)
 class Observed:
-    """What agents and critic see of n games."""
+    """Observations of agents and critic in n games."""
 
     observations: Mapping[str, Array]
-    """Of "robot" and "human", (n, k) float32."""
+    """By agent, "robot" and "human", (n, k) float32."""
     state: Array
-    """What the centralised critic sees, (n, state_size) float32."""
+    """Input of the centralised critic, (n, state_size) float32."""
 
 
 @dataclass(frozen=True)
 class GameOutcome:
-    """What came of a decision of n games."""
+    """Result of one decision in n games."""
 
     observed: Observed
-    """After the next episode has begun where one ended."""
+    """After ended episodes have restarted."""
     reward: Array
     """Shared by both agents, (n,) float32."""
     terminated: Mask
@@ -52,14 +52,14 @@ class GameOutcome:
     truncated: Mask
     """Ended by the time limit, (n,)."""
     final: Observed
-    """Before the next episode began."""
+    """Before ended episodes have restarted."""
     figures: Mapping[str, Array]
-    """Of the k episodes that ended, in the order of the games, by name, (k,); see `iowbc.skill.figures.FIGURES`. Task
-    and partner are names."""
+    """Metrics of the k episodes that ended, in the order of the games, by name, (k,); see
+    `iowbc.skill.figures.FIGURES`. Task and partner are names."""
 
 
 class TransportGame:
-    """n games. What comes of them follows from seed and game, however many workers there are."""
+    """n games. Results depend on the seed and the game's number, not on the number of workers."""
 
     agents = (ROBOT, HUMAN)
 
@@ -74,9 +74,9 @@ class TransportGame:
         partners: Sequence[str] | None = None,
         plans: Sequence[Plan] | None = None,
     ) -> None:
-        """`workers`: processes; 0 plays in this one. `partners`: humans that are drawn, by default those of training.
-        `plans`: one a game, which are then not drawn. Raises UsageError for an unknown task or human, WorkerFailed
-        where a worker dies or hangs."""
+        """`workers`: number of processes; 0 runs the games in this one. `partners`: humans to sample, by default those
+        of training. `plans`: one per game instead of sampling. Raises UsageError for an unknown task or human,
+        WorkerFailed if a worker dies or hangs."""
         skill = specification.recipe.skill
         drawn = skill.partners.training if partners is None else partners
         planned = None if plans is None else tuple(plans)
@@ -91,38 +91,37 @@ class TransportGame:
 
     @property
     def batch(self) -> GameBatch:
-        """The games themselves, where they are played in this process."""
+        """The games, if they run in this process (`workers` 0)."""
         if not isinstance(self._workers, InProcess):
             raise AttributeError("the games live in worker processes; make the game with workers=0")
         return self._workers.batch
 
     @property
     def human_acts(self) -> Mask:
-        """Games whose human is that of the actions, in the episodes now played, (n,)."""
+        """Games in whose current episode the human agent acts, (n,)."""
         return self._buffers["human_acts"].copy()
 
     @property
     def privileged_actions(self) -> Array:
-        """Actions with which the robots would do now what they do where they know the path, (n, 11): zero there."""
+        """Actions that reproduce the command of a robot that knows the path, (n, 11); zero unless the robot follows."""
         return self._buffers["privileged_action"].copy()
 
     def reset(self, seeds: Keys | None = None, agent_share: float = 0.0) -> Observed:
-        """Begins the first episode of every game, the same one each time; with seeds (n,) uint64 that of the seeds.
-
-        `agent_share`: part of the drawn episodes from here on whose human is that of the actions."""
+        """Starts the first episode of every game, the same each time, or that of the seeds (n,) uint64. `agent_share`:
+        fraction of the sampled episodes from now on in which the human agent acts."""
         own = [None if seeds is None else seeds[first:last] for first, last in self._workers.groups]
         self._ask([Message.of(GameBatch.reset, part, agent_share) for part in own])
         return self._observed("now")
 
     def step(self, actions: Mapping[str, Array]) -> GameOutcome:
-        """One decision; actions by agent, (n, k) in [-1, 1]. Raises ValueError where one does not fit or is not
+        """One decision; actions by agent, (n, k) in [-1, 1]. Raises ValueError for a wrong shape or values that are not
         finite."""
         self.act(actions)
         self._ask([Message.of(GameBatch.step)] * len(self._workers.groups))
         return self.outcome()
 
     def act(self, actions: Mapping[str, Array]) -> None:
-        """Hands over actions for the next decision; see `step`."""
+        """Sets the actions of the next decision; see `step`."""
         for agent in self.agents:
             buffer, given = self._buffers[f"action/{agent}"], np.asarray(actions[agent], np.float32)
             if given.shape != buffer.shape or not np.isfinite(given).all():
@@ -131,7 +130,7 @@ class TransportGame:
             buffer[:] = given
 
     def outcome(self) -> GameOutcome:
-        """What came of the last decision."""
+        """Result of the last decision."""
         buffers = self._buffers
         terminated, truncated = buffers["terminated"].copy(), buffers["truncated"].copy()
         return GameOutcome(
@@ -173,8 +172,8 @@ def play_once(
     networks: Mapping[str, TeacherNetwork | None],
     interrupted: Callable[[], bool] = lambda: False,
 ) -> dict[str, Array]:
-    """Figures of the first episode of every game, (n,) by name, in the order of the games, with the mean actions of
-    policies by agent; see `mean_actions`. Raises Interrupted once `interrupted()` is true."""
+    """Metrics of the first episode of every game, (n,) by name, in the order of the games, with the policies' mean
+    actions; see `mean_actions`. Raises Interrupted once `interrupted()` is true."""
     observed, decision = game.reset(), 0
     rows: dict[int, dict[str, Array]] = {}
     while len(rows) < game.n:

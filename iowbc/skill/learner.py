@@ -1,4 +1,4 @@
-"""MAPPO and HAPPO on a game of two agents: decentralised policies, one value of the whole state."""
+"""MAPPO and HAPPO on a game of two agents: decentralised policies, one centralised value network."""
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
@@ -23,14 +23,14 @@ Array = NDArray[np.float32]
 
 
 IMITATION_BATCH = 1024
-"""Samples of a gradient step of the imitation, drawn from all so far."""
+"""Batch size of the imitation, sampled from all data so far."""
 
 
 class SkillTraining:
-    """A training of robot and human, one update at a time; see `iowbc.stages.training.Training`.
+    """Training of robot and human, one update at a time; see `iowbc.stages.training.Training`.
 
-    Both policies begin with an output of zero: the nominal command, and a cooperative human. The human's learns from
-    the episodes in which it acts; the others have scripted humans.
+    Both policies start with zero output: the nominal command, and a cooperative human. The human policy learns from the
+    episodes in which it acts; the others have scripted humans.
     """
 
     def __init__(self, settings: SkillLearning, game: TransportGame, seed: int) -> None:
@@ -45,7 +45,7 @@ class SkillTraining:
         seen = sizes[ROBOT] if settings.algorithm == "ppo" else game.state_size
         self.critic = Trained(seen, 1, settings, VALUE_GAIN, settings.value_learning_rate)
         self.imitated = self._nothing_imitated()
-        """Observations and privileged actions of the robot while it imitates."""
+        """Imitation dataset: the robot's observations and privileged actions."""
 
     def _nothing_imitated(self) -> dict[str, Tensor]:
         sizes = {"observation": self.game.observation_sizes[ROBOT], "action": self.game.action_sizes[ROBOT]}
@@ -57,22 +57,22 @@ class SkillTraining:
 
     @property
     def agent_share(self) -> float:
-        """Part of the episodes in which the learnt human acts."""
+        """Fraction of the episodes in which the learnt human acts."""
         alone = self.settings.algorithm == "ppo" or self.steps < self.settings.scripted_steps
         return 0.0 if alone else self.settings.learnt_share
 
     def update(self) -> dict[str, float]:
-        """One rollout of every game and its gradient steps; returns their figures."""
+        """One rollout of every game and its gradient steps; returns their metrics."""
         samples, figures = self._collect()
         self.steps += self.game.n * self.settings.rollout
         return figures | self._learn(samples)
 
     def _judged(self, observed: Observed) -> Array:
-        """What the value network sees."""
+        """Input of the value network."""
         return observed.observations[ROBOT] if self.settings.algorithm == "ppo" else observed.state
 
     def _collect(self) -> tuple[dict[str, Tensor], dict[str, float]]:
-        """A rollout: samples by name, flattened, and figures of its episodes."""
+        """A rollout: samples by name, flattened, and metrics of its episodes."""
         settings, game = self.settings, self.game
         if self.steps:
             self._move()
@@ -122,17 +122,17 @@ class SkillTraining:
         return {name: values.flatten(0, 1).clone() for name, values in samples.items()}, _of_episodes(episodes)
 
     def _take_in(self, rows: Mapping[str, Array]) -> None:
-        """Take what networks saw, (T, n, k) each, into their statistics."""
+        """Update the normalisation statistics with the networks' inputs, (T, n, k) each."""
         for name, each in self.trained.items():
             each.normalization.observe(rows[name].reshape(-1, rows[name].shape[-1]))
 
     def _move(self) -> None:
-        """Let the networks' normalisers use their statistics."""
+        """Copy the statistics into the networks' normalisers."""
         for each in self.trained.values():
             each.normalization.move(each.network.normalizer)
 
     def _explored(self, observed: Observed) -> dict[str, Array]:
-        """An action of each agent, drawn from its Gaussian."""
+        """Sampled action of each agent."""
         found = {}
         with torch.inference_mode():
             for name, agent in self.agents.items():
@@ -168,7 +168,7 @@ class SkillTraining:
         ]
 
     def _improve(self, names: Sequence[str], samples: Mapping[str, Tensor]) -> dict[str, float]:
-        """Gradient steps of these policies side by side; the factor then holds what they changed."""
+        """Gradient steps of these policies; with HAPPO, the factor is then multiplied by their probability ratios."""
         figures: dict[str, float] = {}
         for name in names:
             agent = self.agents[name]
@@ -208,7 +208,7 @@ class SkillTraining:
         return loss - self.settings.entropy * entropy(agent.log_std), share
 
     def _fit(self, samples: Mapping[str, Tensor]) -> float:
-        """Gradient steps of the value; its mean squared error."""
+        """Gradient steps of the value network; returns its mean squared error."""
         losses = []
         for batch in self._batches(len(samples["target"])):
             value = self.critic.network.body(samples["critic/input"][batch])[:, 0]
@@ -218,8 +218,8 @@ class SkillTraining:
         return float(np.mean(losses))
 
     def _imitate(self, samples: Mapping[str, Tensor]) -> float:
-        """Gradient steps of the robot towards its privileged actions in all rollouts so far; the mean squared error in
-        the newest, before them."""
+        """Gradient steps of the robot's policy towards its privileged actions in all rollouts so far; returns the mean
+        squared error in the newest rollout, before the steps."""
         robot, settings = self.agents[ROBOT], self.settings
         seen, wanted = self.imitated["observation"], self.imitated["action"]
         with torch.inference_mode():
@@ -247,7 +247,7 @@ class SkillTraining:
         return np.concatenate(found)
 
     def arrays(self) -> Arrays:
-        """Everything that a resumed training needs, between two updates."""
+        """Training state for resuming, between two updates."""
         networks = [prefixed(name, each.arrays()) for name, each in self.trained.items()]
         whole: Arrays = {"steps": np.array([self.steps]), **prefixed("random", checkpoint.random_arrays())}
         whole |= prefixed("imitated", {name: values.numpy() for name, values in self.imitated.items()})
@@ -264,7 +264,7 @@ class SkillTraining:
 
 
 def _of_episodes(ended: Sequence[Mapping[str, NDArray[Any]]]) -> dict[str, float]:
-    """Means over the episodes that ended, by who was the human."""
+    """Means over the ended episodes, by kind of human."""
     columns = {name: np.concatenate([np.asarray(each[name]) for each in ended]) for name in ended[0]}
     columns = {name: values.astype(np.float64) for name, values in columns.items() if values.dtype.kind in "fib"}
     learnt = columns.pop("learnt") > 0.0

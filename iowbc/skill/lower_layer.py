@@ -22,17 +22,17 @@ from iowbc.task.vector.shared import private_buffers
 
 @dataclass(frozen=True)
 class Student:
-    """A student and the length of its history."""
+    """Student policy and its history length."""
 
     policy: HistoryPolicy
     history: int
-    """Observations in H_t."""
+    """Number of observations in H_t."""
     observation: int
-    """Size of the part of s_t that it sees."""
+    """Size of the part of s_t that the student observes."""
 
 
 def load_student(folder: Path) -> Student:
-    """The student in the artifact of `distill`. Raises StageFailed for a policy that is none."""
+    """The student in the artifact of `distill`. Raises StageFailed for another kind of policy."""
     from iowbc.learning.as_numpy import student_policy
     from iowbc.learning.storage import load_student_network
 
@@ -41,7 +41,7 @@ def load_student(folder: Path) -> Student:
 
 
 class LowerLayer(Batch):
-    """n environments that a student controls. Commands and partners are steered; episodes begin when asked for."""
+    """n environments controlled by a student. Commands, partners and starts of episodes are set by the caller."""
 
     def __init__(
         self,
@@ -63,28 +63,28 @@ class LowerLayer(Batch):
             episodes=episodes,
         )
         self.wanted = np.tile(nominal_command(specification.recipe.task.commands), (self.n, 1))
-        """The commands that robots approach, (n, 11)."""
+        """Commands that the robots approach, (n, 11)."""
         self.guidance.commander.steer(self.wanted)
         self.simulation.partner.steered[:] = True
         self.moved: Motion
         """The motion after the last control step."""
         self.fallen, self.dropped, self.diverged = np.zeros((3, self.n), np.bool_)
-        """What happened since the episode began, (n,)."""
+        """Events since the episode began, (n,)."""
         self.human = np.zeros((self.n, 4))
-        """What humans want: velocity of the handle and yaw rate of the object in the frame of the start [m/s, rad/s]
-        and height of the handle [m], (n, 4)."""
+        """Intentions of humans: velocity of the handle and yaw rate of the object, start frame [m/s, rad/s], and height
+        of the handle [m], (n, 4)."""
         self._student, self._block = student.policy, block
         self._history = History(self.n, student.history, student.observation)
         self._starts = np.ones(self.n, np.bool_)
 
     def rewind(self, seeds: Keys) -> None:
-        """Lets all that is random start anew from seeds (n,)."""
+        """Reseeds all random draws, (n,)."""
         self._schedule.reseed(seeds)
         self.simulation.reseed(self._schedule.key)
         self.memory.episode[:] = 0
 
     def start(self, which: Indices) -> None:
-        """Begins new episodes in some environments, (k,)."""
+        """Starts new episodes in some environments, (k,)."""
         self.moved = self.begin(which)
         self._observe(self.moved, which)
         self._starts[which] = True
@@ -99,13 +99,13 @@ class LowerLayer(Batch):
         self.step()
 
     def record(self, judgement: Judgement, action: Array) -> None:
-        """Nobody reads the signals of a trial."""
+        """Records nothing: the game does not use trial signals."""
 
     def feed_partner(self, feed: Array) -> None:
         feed[:] = self.human
 
     def finish(self, judgement: Judgement) -> None:
-        """Notes what happened; the game decides when episodes end."""
+        """Records falls, drops and divergence; the game decides when episodes end."""
         self.moved, ending = judgement.motion, judgement.ending
         self.fallen |= ending.fallen
         self.dropped |= ending.dropped

@@ -1,4 +1,4 @@
-"""What robot, human and centralised critic observe of a game: parts by name, which are joined in order."""
+"""Observations of robot, human and centralised critic: named parts, concatenated in order."""
 
 import numpy as np
 
@@ -14,22 +14,22 @@ from iowbc.task.motion import Motion
 
 DRAWN = {"partner_stiffness": 300.0, "partner_damping": 50.0, "partner_delay": 0.3, "partner_noise": 8.0}
 DRAWN |= {"partner_pace": 1.0, "partner_share": 1.0, "object_mass": 20.0, "object_ground_friction": 0.1}
-"""Quantities of the simulation that the critic sees, with their units."""
+"""Simulation quantities that the critic observes, with their scales."""
 FELT = 28
-"""Size of what the human observes."""
+"""Size of the human's observation."""
 HIDDEN = 13 + len(BEHAVIOURS) + len(DRAWN)
 
 
 def sizes(skill: Skill) -> tuple[tuple[str, int], ...]:
-    """Sizes of what "robot" and "human" observe, and of the "state" that the centralised critic sees: both, and what is
+    """Sizes of the observations of "robot" and "human", and of the centralised critic's "state": both, and what is
     hidden from them."""
     robot = SENSED + 6 * skill.robot.history
     return ("robot", robot), ("human", FELT), ("state", robot + FELT + HIDDEN)
 
 
 def waypoints(paths: Paths, now: Situation, ahead: tuple[float, float], heading: Array) -> Array:
-    """The next points of the path from the object's centre in a frame with a heading (n,) [rad]: x, y, heading, height
-    from the object's, of each; and the way left. (n, 9)."""
+    """Next points of the path relative to the object's centre, in a frame with a heading (n,) [rad]: x, y, heading and
+    relative height of each, then the remaining length. (n, 9)."""
     columns = []
     for distance in ahead:
         way = now.covered + distance
@@ -40,8 +40,8 @@ def waypoints(paths: Paths, now: Situation, ahead: tuple[float, float], heading:
 
 
 def felt_by_human(now: Situation, force: Array, action: Array, ahead: Array) -> dict[str, Array]:
-    """What a human observes, in the frame of the object's yaw; `force` (n, 3) on the object in the frame of the start
-    [N], `action` (n, 5): its last one, `ahead` (n, 9): its waypoints."""
+    """Human observation in the frame of the object's yaw. `force` (n, 3): on the object, start frame [N]; `action` (n,
+    5): its last one; `ahead` (n, 9): its waypoints."""
     return {
         "handle": turned(now.handle - now.position, -now.yaw),
         "handle_velocity": turned(now.handle_velocity, -now.yaw),
@@ -57,8 +57,7 @@ def felt_by_human(now: Situation, force: Array, action: Array, ahead: Array) -> 
 
 
 def hidden(simulation: Simulation, moved: Motion, seconds_left: Array, acts: Array) -> dict[str, Array]:
-    """What neither agent observes and the critic does;
-    `acts`: whether the human of the actions plays, (n,)."""
+    """Critic inputs that neither agent observes; `acts`: true where the human agent acts, (n,)."""
     drawn = simulation.drawn
     behaviour = drawn["partner_behaviour"].astype(int)
     return {

@@ -1,4 +1,4 @@
-"""One game as a PettingZoo `ParallelEnv`, for the learners of others."""
+"""One game as a PettingZoo `ParallelEnv`, for external learners."""
 
 from typing import Any, ClassVar
 
@@ -16,7 +16,7 @@ Values = dict[str, Any]
 
 
 class TransportEnv(ParallelEnv):  # type: ignore[misc]
-    """Robot and human, who both act by default."""
+    """Robot and human; both act by default."""
 
     metadata: ClassVar[Values] = {"name": "iowbc_transport_v0", "is_parallelizable": True, "render_modes": []}
 
@@ -28,7 +28,7 @@ class TransportEnv(ParallelEnv):  # type: ignore[misc]
         plan: Plan | None = None,
         partners: tuple[str, ...] = (AGENT,),
     ) -> None:
-        """`plan`: what is held in every episode; without, tasks and humans (`partners`) are drawn."""
+        """`plan`: fixed quantities of every episode; without it, tasks and humans (`partners`) are sampled."""
         plans = None if plan is None else (plan,)
         self.game = TransportGame(specification, student, n=1, partners=partners, plans=plans)
         self.possible_agents = list(TransportGame.agents)
@@ -50,7 +50,7 @@ class TransportEnv(ParallelEnv):  # type: ignore[misc]
         return self._spaces[agent][1]
 
     def reset(self, seed: int | None = None, options: Values | None = None) -> tuple[dict[str, Array], Values]:
-        """Begins an episode: the one of a seed, else another one."""
+        """Starts an episode: reproducible with a seed, otherwise a new random one."""
         del options
         if seed is not None:
             self._random = np.random.default_rng(seed)

@@ -1,4 +1,4 @@
-"""Paths of transport tasks as points at equal distances, and where objects are on them."""
+"""Paths of transport tasks as equidistant points, and projection of objects onto them."""
 
 from collections.abc import Sequence
 
@@ -8,10 +8,10 @@ from iowbc.arrays import Array, Indices
 from iowbc.recipe.skill.task import Stretch
 
 SPACING = 0.05
-"""Distance of the points of a path [m]: a tenth of the smallest object."""
+"""Spacing of the points of a path [m]: a tenth of the smallest object."""
 WINDOW = 10
-"""Points before and behind the last place among which the next one is sought: no object moves so far in a decision,
-and a path that comes near itself is not left for its other part."""
+"""Half width, in points, of the search window around the last place. No object moves that far in a decision, and the
+search cannot jump to another part of a path that passes near itself."""
 
 
 class Paths:
@@ -25,11 +25,11 @@ class Paths:
         self.points, self._heading, self._height, self._half_width = rows[..., :2], *np.moveaxis(rows[..., 2:], 2, 0)
         """Points (paths, k, 2) [m]."""
         self.length = np.array([sum(stretch.length for stretch in path) for path in paths])
-        """(paths,) [m]."""
+        """Length of each path, (paths,) [m]."""
 
     def place(self, path: Indices, position: Array, around: Array) -> tuple[Array, Array]:
-        """Places of positions (n, 2) [m] near the way `around` (n,) [m] on paths (n,): way along the path, and distance
-        from it, positive to its left, (n,) [m]."""
+        """Projects positions (n, 2) [m] onto paths (n,), near the arc length `around` (n,) [m]: arc length, and
+        distance from the path, positive to its left, (n,) [m]."""
         centre = np.round(around / SPACING).astype(np.int64)
         near = (centre[:, None] + np.arange(-WINDOW, WINDOW + 1)).clip(0, self._last[path, None])
         away = position[:, None] - self.points[path[:, None], near]
@@ -41,7 +41,7 @@ class Paths:
         return covered.clip(0.0, self.length[path]), cosine * away[:, 1] - sine * away[:, 0]
 
     def heading(self, path: Indices, covered: Array) -> Array:
-        """The path's heading at a way along it, (n,) [rad]; beyond the end that of the end."""
+        """Heading of the path at an arc length, (n,) [rad]; constant beyond its ends."""
         return self._read(self._heading, path, covered)
 
     def height(self, path: Indices, covered: Array) -> Array:
@@ -62,11 +62,11 @@ class Paths:
         return points, np.stack([points + away, points - away])
 
     def point(self, path: Indices, covered: Array) -> Array:
-        """Points at ways along paths, (n, 2) [m]."""
+        """Points at arc lengths along paths, (n, 2) [m]."""
         return np.stack([self._read(self.points[..., axis], path, covered) for axis in (0, 1)], axis=1)
 
     def curvature(self, path: Indices, covered: Array) -> Array:
-        """Change of heading by way, (n,) [rad/m]."""
+        """Change of heading per arc length, (n,) [rad/m]."""
         change: Array = self.heading(path, covered + SPACING) - self.heading(path, covered)
         return change / SPACING
 

@@ -1,4 +1,4 @@
-"""Episodes of a game, planned or drawn: task, human and load of each, and whether the robot knows the path."""
+"""Planned or sampled episodes: task, human and load of each, and whether the robot knows the path."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -13,42 +13,42 @@ from iowbc.recipe.skill.task import TransportTask
 
 AGENT, ABSENT, CLOCK, PERSON = "agent", "absent", "clock", "person"
 KINDS = (*BEHAVIOURS, AGENT, ABSENT, CLOCK, PERSON)
-"""Humans: scripted ones with a behaviour; the one of the actions; nobody; one who walks the path by the clock; a person
-whose hand leads the handle (`GameBatch.hand`)."""
+"""Kinds of human: scripted behaviours; the agent, which acts by a policy; nobody; one that walks the path by the clock;
+a person, whose hand leads the handle (`GameBatch.hand`)."""
 Rule = Literal["lead", "follow", "clock", "stand"]
 RULES: tuple[Rule, ...] = get_args(Rule)
-"""Nominal commands of the robot: along the path; with the forces on its hands; along the path by the clock, whatever
-the object does; standing."""
+"""Nominal commands of the robot: along the path; with the forces on its hands; along the path by the clock, regardless
+of the object; standing."""
 
 CLOCK_PACE = (0.5, 1.5)
-"""Range of the pace of a human who ignores the robot: the simulation's leaders go half as fast again at most."""
+"""Pace range of a human who ignores the robot; the simulation's leaders walk at most 1.5 times the nominal speed."""
 FOLLOWER = BEHAVIOURS.index("follower")
 ZERO_FOR_A_PERSON = ("partner_delay", "partner_noise", "partner_share_drift", "start_yaw")
-"""Imperfections that are drawn for scripted humans, as a person has its own, and the robot's heading in its view."""
+"""Zero for a person: imperfections of scripted humans, and the robot's initial heading in the person's view."""
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What is held in every episode of an environment; all else is drawn."""
+    """Fixed quantities of every episode of an environment; the others are sampled."""
 
     task: str
     """Name of a transport task."""
     partner: str
     """One of `KINDS`."""
     known: bool
-    """Whether the robot knows the path."""
+    """True if the robot knows the path."""
     mass: float | None = None
-    """Object's mass [kg]; empty draws it from the task's range."""
+    """Object's mass [kg]; sampled from the task's range if empty."""
     share: float | None = None
-    """The human's share; empty draws it from the task's range."""
+    """The human's share; sampled from the task's range if empty."""
     seed: int | None = None
-    """Seed of the environment's episodes; empty takes the game's seed and the environment's number."""
+    """Seed of the environment's episodes; if empty, from the game's seed and the environment's number."""
     rule: Rule | None = None
-    """Nominal command; empty leads where the robot knows the path and follows where it does not."""
+    """Nominal command; if empty, lead if the robot knows the path, else follow."""
 
 
 class EpisodeDraws:
-    """Episodes of n games, drawn from keys or planned."""
+    """Episodes of n games, sampled from keys or planned."""
 
     def __init__(
         self,
@@ -58,8 +58,8 @@ class EpisodeDraws:
         goal_known: float,
         plans: Sequence[Plan] | None,
     ) -> None:
-        """`scenes`: of each game; `partners`: humans that are drawn; `goal_known`: how often the robot knows the path;
-        `plans`: one a game."""
+        """`scenes`: one per game; `partners`: humans to sample; `goal_known`: probability that the robot knows the
+        path; `plans`: one per game."""
         n, own = len(scenes), list(tasks.values())
         self._goal_known, self._plans, self.agent_share = goal_known, plans, 0.0
         self._kinds = np.array([KINDS.index(kind) for kind in partners])
@@ -73,20 +73,20 @@ class EpisodeDraws:
         self.pace = np.ones(n)
         """Speed of a human who ignores the robot, as a fraction of the nominal speed, (n,)."""
         self.known, self.acts = np.zeros((2, n), np.bool_)
-        """True where the robot knows the path; true where the learning human plays, (n,)."""
+        """True where the robot knows the path; true where the human agent acts, (n,)."""
         if plans is not None:
             self.task[:] = [list(tasks).index(plan.task) for plan in plans]
             self.kind[:] = [KINDS.index(plan.partner) for plan in plans]
             self.known[:] = [plan.known for plan in plans]
 
     def draw(self, which: Indices, key: Keys) -> dict[str, Array]:
-        """Draws the next episodes of some games from keys (k,); quantities to hold in the simulation, by name, (k,)."""
+        """Samples the next episodes of some games from keys (k,); values to fix in the simulation, by name, (k,)."""
         chance = random.uniform(key, "game", 6)
         if self._plans is None:
             self.task[which] = (chance[:, :1] >= self._tasks[which]).sum(axis=1)
             scripted = self._kinds[(chance[:, 1] * len(self._kinds)).astype(np.int64)]
             self.kind[which] = np.where(chance[:, 5] < self.agent_share, KINDS.index(AGENT), scripted)
-            leads = self.kind[which] != FOLLOWER  # a human who follows shows nobody the goal
+            leads = self.kind[which] != FOLLOWER  # a follower does not reveal the goal
             self.known[which] = (chance[:, 2] < self._goal_known) | ~leads
         task, kind = self.task[which], self.kind[which]
         mass, share = (

@@ -11,33 +11,33 @@ from iowbc.skill.situation import Situation
 
 @dataclass(frozen=True)
 class GameEnding:
-    """Why games end with a decision, each (n,)."""
+    """Causes of endings in a decision, each (n,)."""
 
     success: Mask
     fallen: Mask
     dropped: Mask
     touched: Mask
-    """An object's corner was in a wall, which ends the game by recipe."""
+    """A corner of the object in a wall, if the recipe ends the game there."""
     strayed: Mask
     diverged: Mask
     time_out: Mask
 
     @property
     def failed(self) -> Mask:
-        """Ended by what costs; a simulation that diverged is nobody's fault."""
+        """Ended with a penalty; divergence of the simulation has none."""
         return self.fallen | self.dropped | self.touched | self.strayed
 
     @property
     def terminated(self) -> Mask:
-        """Ended otherwise than by time."""
+        """Ended other than by the time limit."""
         return self.success | self.failed | self.diverged
 
 
 def ending(
     skill: Skill, now: Situation, *, held: Mask, happened: tuple[Mask, Mask, Mask], touched: Mask, late: Mask
 ) -> GameEnding:
-    """Endings of games: `held`: with an object in the hands; `happened`: falls, drops and divergence; `touched`: walls;
-    `late`: past the time limit; (n,) each."""
+    """Endings of games, (n,) each. `held`: object in the hands; `happened`: falls, drops and divergence; `touched`:
+    walls; `late`: past the time limit."""
     finish = skill.finish
     fallen, dropped, diverged = happened
     reached = (now.left < finish.distance) & (np.abs(now.lateral) < finish.lateral)
@@ -52,7 +52,7 @@ def ending(
 
 
 def potential(skill: Skill, now: Situation, held: Mask) -> Array:
-    """Φ = progress · way - path |e| - yaw |ψ| - height |z|, (n,)."""
+    """Potential Φ = progress · s - path |e| - yaw |ψ| - height |z| with the arc length s, (n,)."""
     weights = skill.reward
     value: Array = weights.progress * now.covered - weights.path * np.abs(now.lateral)
     value -= weights.yaw * np.abs(now.yaw_error) + weights.height * held * np.abs(now.height_error)
@@ -60,9 +60,9 @@ def potential(skill: Skill, now: Situation, held: Mask) -> Array:
 
 
 def reward(skill: Skill, gained: Array, end: GameEnding, costs: Array, jerk: Array, touched: Mask) -> Array:
-    """Shared reward of a decision, (n,): `gained`: difference of the potential; `costs` (3, n): integrals of internal
-    force [N·s], of the size of the human's power [J] and of the object's tilt [rad·s]; `jerk`: mean squared change of
-    the robot's action."""
+    """Shared reward of a decision, (n,). `gained`: change of the potential; `costs` (3, n): integrals of internal force
+    [N·s], of the human's absolute power [J] and of the object's tilt [rad·s]; `jerk`: mean squared change of the
+    robot's action."""
     weights, seconds = skill.reward, 1.0 / skill.frequency
     value: Array = gained + weights.success * end.success - weights.failure * end.failed
     value -= weights.internal_force * costs[0] + weights.partner_work * costs[1] + weights.tilt * costs[2]

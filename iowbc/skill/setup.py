@@ -1,4 +1,4 @@
-"""What a process needs to know to build its part of the games."""
+"""Specification from which a process builds its part of the games."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -31,12 +31,12 @@ class GameSetup:
     """Number of games."""
     seed: int
     partners: tuple[str, ...]
-    """Humans that are drawn for the episodes of games without a plan."""
+    """Humans to sample in games without a plan."""
     plans: tuple[Plan, ...] | None = None
-    """One a game; without, tasks and humans are drawn."""
+    """One per game; without plans, tasks and humans are sampled."""
 
     def __post_init__(self) -> None:
-        """Raises UsageError where the recipe has no such task or there is no such human."""
+        """Raises UsageError for an unknown task or human, or a wrong number of plans or games."""
         if self.count < 1 or (self.plans is not None and len(self.plans) != self.count):
             found = "no games" if self.plans is None else f"{len(self.plans)} plans for {self.count} games"
             raise UsageError(f"{found}: give each of one or more games its plan")
@@ -64,7 +64,7 @@ class GameSetup:
         return scene_of(self.count, weights.items())
 
     def keys(self, first: int, last: int) -> Keys:
-        """Keys of all that is random in some games, (k,)."""
+        """Random keys of some games, (k,)."""
         key = random.environment_key(self.seed, np.arange(first, last))
         for row, plan in enumerate(self.plans[first:last] if self.plans is not None else ()):
             if plan.seed is not None:
@@ -72,7 +72,7 @@ class GameSetup:
         return key
 
     def buffer_fields(self) -> Fields:
-        """What passes between the games and the learner."""
+        """Buffers that games and learner share."""
         seen = {f"{time}/{name}": ((size,), "float32") for time in ("now", "final") for name, size in sizes(self.skill)}
         return {
             **seen,
@@ -86,5 +86,5 @@ class GameSetup:
         }
 
     def batch(self, first: int, last: int, buffers: Buffers) -> GameBatch:
-        """The games from `first` to `last`, the latter excluded."""
+        """The games from `first` to `last` (excluded)."""
         return GameBatch(self, first, last, buffers)

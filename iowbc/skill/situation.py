@@ -1,4 +1,4 @@
-"""The state of the games as robot, human and reward see it: objects on their paths, in the frame of the start."""
+"""State of the games for observations and reward: objects on their paths, start frame."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ from iowbc.task.motion import Motion
 
 @dataclass(frozen=True)
 class Origin:
-    """Frames in which paths lie: the object's centre and the robot's heading at the start."""
+    """Start frames, in which paths are defined: the object's centre and the robot's heading at the start."""
 
     position: Array
     """(n, 3) [m]."""
@@ -27,30 +27,30 @@ class Origin:
 
 @dataclass(frozen=True)
 class Situation:
-    """n games at one time. Positions and vectors in the frame of the start."""
+    """n games at one time; positions and vectors in the start frame."""
 
     path: Indices
     """Numbers of the paths, (n,)."""
     position: Array
-    """Of the object's centre, (n, 3) [m]."""
+    """Object's centre, (n, 3) [m]."""
     velocity: Array
-    """Of the object's centre, (n, 3) [m/s]."""
+    """Object's centre, (n, 3) [m/s]."""
     yaw: Array
-    """Of the object, (n,) [rad]."""
+    """Yaw of the object, (n,) [rad]."""
     yaw_rate: Array
-    """Of the object, (n,) [rad/s]."""
+    """Yaw rate of the object, (n,) [rad/s]."""
     tilt: Array
-    """Of the object from upright, (n,) [rad]."""
+    """Tilt of the object from upright, (n,) [rad]."""
     handle: Array
     """Far handle, (n, 3) [m]."""
     handle_velocity: Array
     """(n, 3) [m/s]."""
     heading: Array
-    """Of the robot, (n,) [rad]."""
+    """Heading of the robot, (n,) [rad]."""
     base: Array
-    """The pelvis, (n, 3) [m]."""
+    """Pelvis, (n, 3) [m]."""
     covered: Array
-    """Way of the object along its path, (n,) [m]."""
+    """Arc length that the object has covered, (n,) [m]."""
     lateral: Array
     """Distance of the object from its path, positive to the left, (n,) [m]."""
     yaw_error: Array
@@ -58,13 +58,13 @@ class Situation:
     height_error: Array
     """Height of the object less the path's, (n,) [m]."""
     left: Array
-    """Way to the end of the path, (n,) [m]."""
+    """Remaining arc length, (n,) [m]."""
 
 
 def situation(
     simulation: Simulation, moved: Motion, origin: Origin, paths: Paths, path: Indices, covered: Array
 ) -> Situation:
-    """The games after a control step; `covered` (n,): way along the paths at an earlier time [m]."""
+    """State after a control step; `covered` (n,): arc length at an earlier time [m]."""
     state = simulation.state
     position = origin.turned(state.object_position - origin.position)
     forward, up = (rotate(state.object_quaternion, np.tile(axis, (simulation.n, 1))) for axis in np.eye(3)[::2])

@@ -19,7 +19,7 @@ Values = NDArray[np.float32]
 
 
 class Trained:
-    """A network that learns, with the running statistics of its inputs and its optimiser."""
+    """A network in training, with its optimiser and the running statistics of its inputs."""
 
     def __init__(self, inputs: int, outputs: int, settings: SkillLearning, gain: float, rate: float) -> None:
         """`gain`: of the output layer's orthogonal weights; 0 gives zero at the start. `rate`: Adam's learning rate."""
@@ -35,7 +35,7 @@ class Trained:
         self.normalization = Normalization(inputs, settings.games, settings.gamma, None)
         self.rate, self.gradient_norm = rate, settings.gradient_norm
         self.log_std = nn.Parameter(torch.full((outputs,), float(np.log(settings.initial_std))))
-        """Of a policy; a value has no use for it."""
+        """Used by policies only."""
         self.parameters = [*self.network.body.parameters(), self.log_std]
         self.optimizer = torch.optim.Adam(self.parameters, lr=self.rate, eps=1e-5)
 
@@ -76,7 +76,7 @@ class Trained:
 def mean_actions(
     networks: Mapping[str, TeacherNetwork | None], observations: Mapping[str, Values], sizes: Mapping[str, int]
 ) -> dict[str, Values]:
-    """The mean action of each agent's policy, (n, size), within its bounds; zero, the nominal one, without a policy."""
+    """Mean action of each agent's policy, (n, size), within its bounds; zero, the nominal action, without a policy."""
     found: dict[str, Values] = {}
     for agent, network in networks.items():
         seen = observations[agent]

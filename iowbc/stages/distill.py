@@ -1,4 +1,4 @@
-"""Stage `distill`: the student drives, the teacher says what it would have done, the student learns it (DAgger)."""
+"""Stage `distill`: the student acts, the teacher labels the states with actions, the student imitates (DAgger)."""
 
 from collections.abc import Iterator, Mapping
 
@@ -21,11 +21,11 @@ PANELS = (
 )
 """Shown in the figure of the learning curves."""
 FACTS = ("object_mass", "base_linear_velocity")
-"""Privileged observations of the load, which the auxiliary loss reads from the latent."""
+"""Privileged observations (load and base velocity) that the auxiliary loss predicts from the latent."""
 
 
 def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
-    """A teacher that is a student already, or what s_priv does not hold."""
+    """Problems: a teacher that is a student, names not in s_priv, or scenes and experts that do not match."""
     yield from not_privileged(recipe, "distill.withheld", recipe.distill.withheld)
     if experts := recipe.distill.experts:
         played = [name for name, share in recipe.task.scenes if share > 0.0]

@@ -25,11 +25,11 @@ if TYPE_CHECKING:
 ACTOR = "rollout actor"
 """Name of a group of environments on another machine."""
 WRITTEN = ("action", "counters", "terms")
-"""Buffers in which the learner's side writes, too: actions, and figures that it sets back once it has read them."""
+"""Buffers that the learner also writes: actions, and statistics that it resets after reading."""
 
 
 def training_environments(job: Job, *, count: int, seed: int, divergences: Path | None = None) -> VectorEnv:
-    """The environments of a job's recipe, stepped where it says. `divergences`: see `VectorEnv`."""
+    """The environments of a job's recipe, here or on `rollout_actors`. `divergences`: see `VectorEnv`."""
     world = Specification(job.recipe, job.robot, job.inputs.get("rg-fit"))
     actors = job.recipe.execution.rollout_actors
     workers: int | Callable[[Setup], Workers] = job.workers
@@ -42,7 +42,7 @@ class RemoteWorkers(Workers):
     """Environments in groups on other machines; what is here is a copy of their buffers after the last request."""
 
     def __init__(self, spread: "NodeSpread", count: int, setup: Setup) -> None:
-        """`count`: groups that are asked for."""
+        """`count`: number of groups."""
         world = setup.specification
         folders = {"robot": world.robot} | ({} if world.rg is None else {"generator": world.rg})
         self.groups = shares_in_blocks(setup.count, count)

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 FORCES = ("handle_force_p95", "hand_force_p95")
-"""Shown of each behaviour of the partner."""
+"""Force metrics shown for compliance trials."""
 
 
 def acting_stage(recipe: Recipe) -> tuple[str, ...]:
@@ -35,7 +35,7 @@ def acting_stage(recipe: Recipe) -> tuple[str, ...]:
 
 
 def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
-    """A student that no stage leaves, and what a controller that this project did not train lacks."""
+    """Problems: a student that no stage trains, and settings that do not fit an external controller."""
     if recipe.eval.policy == "student" and not leaves_student(recipe):
         text = "asks for the student, and no stage of the recipe trains one: add `distill` to its stages, or evaluate "
         yield "eval.policy", f"{text}the teacher with --set eval.policy=teacher"
@@ -114,7 +114,7 @@ def measure(job: Job, world: "Specification", policy: "Policy") -> dict[str, flo
 
 
 def probe(job: Job, world: "Specification", policy: "Policy") -> dict[str, float]:
-    """Read the object's mass from what the policy sees, and report it; R² and error of each source."""
+    """Regress the object's mass on the policy's inputs and write the report; returns R² and RMSE of each source."""
     from iowbc.evaluation.probe import inferred_masses, read
     from iowbc.evaluation.report.probe import write_probe
 
@@ -150,7 +150,7 @@ def read_by_trials(job: Job) -> dict[str, Path]:
 def play_everywhere(
     spread: "NodeSpread", recipe: Recipe, folders: Mapping[str, Path], batches: "Batches"
 ) -> "Iterator[tuple[str, bytes]]":
-    """Play batches of trials on other machines; name and file of each. `folders`: what `play_batch` reads, by name."""
+    """Play batches of trials on other machines; name and content of each file. `folders`: inputs of `play_batch`."""
     names = list(batches)
     for place, content in spread(play_batch, [(recipe, batches[name]) for name in names], folders):
         yield names[place], content
@@ -171,8 +171,8 @@ def play_batch(
 
 
 def headline(summary: "pd.DataFrame") -> dict[str, float]:
-    """The figures to show at the end of a run: success and errors at the lightest and heaviest mass of each suite, and
-    forces where a partner is met."""
+    """Main metrics: success and errors of each case and at the lightest and heaviest mass of each suite, and forces of
+    compliance trials."""
     from iowbc.evaluation.report.other_tables import PROBING
     from iowbc.evaluation.trials.errors import ERRORS
 
@@ -193,7 +193,7 @@ def headline(summary: "pd.DataFrame") -> dict[str, float]:
 
 
 def _load(row: "pd.Series[Any]") -> str:
-    """The case, where it has a name of its own, and the mass."""
+    """Text of mass and, if different from the suite, case."""
     mass = f"{row['mass']:g} kg"
     return mass if row["case"] == row["suite"] else f"{row['case']} ({mass})"
 

@@ -18,14 +18,14 @@ if TYPE_CHECKING:
 
 
 def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
-    """A policy that needs what no robot measures."""
+    """Problems: a policy that needs privileged observations."""
     if not leaves_student(recipe):
         text = "names export, and no stage of the recipe trains a student: a policy that needs privileged observations "
         yield "stages", f"{text}cannot run on a robot; add `distill` to its stages, or leave `export` out"
 
 
 def run(job: Job) -> None:
-    """Export, hold the graph against torch, and let the exported controller carry its load in the simulation."""
+    """Export, compare the graph with torch, and play the acceptance trials with the exported controller."""
     import numpy as np
     import torch
 
@@ -38,7 +38,7 @@ def run(job: Job) -> None:
     from iowbc.learning.storage import load_student_network
     from iowbc.task.specification import Specification
 
-    torch.set_num_threads(1)  # as on the robot, where the controller has one thread
+    torch.set_num_threads(1)  # as on the robot, where the controller uses one thread
     rg, (student, about) = job.inputs.get("rg-fit"), load_student_network(job.inputs[policy_stage(job.recipe)])
     graph = _graph(job, student, about)
     sources = {stage: folder.name for stage, folder in job.inputs.items()} | {"export": job.key}
@@ -67,7 +67,7 @@ def run(job: Job) -> None:
         },
     }
     job.report.metrics(metrics, 0)
-    contract.seal(statement, job.out)  # before the summary, whose times differ each time
+    contract.seal(statement, job.out)  # before the summary, whose times differ between runs
     job.summarize(metrics, parity_by_output=differences, acceptance=[each.sentence for each in played])
     job.report.say(
         f"torch and onnxruntime differ by {metrics['parity']:.1e} at most over {len(steps)} steps; "

@@ -20,7 +20,7 @@ def leaves_student(recipe: Recipe) -> bool:
 
 
 def not_privileged(recipe: Recipe, path: str, names: Sequence[str]) -> Iterator[tuple[str, str]]:
-    """Names at a dotted path of the recipe that are no parts of s_priv, as a stage's problems."""
+    """Problems of a stage: names at a dotted recipe path that are not in s_priv."""
     if not names:
         return
     from iowbc.task.privileged import PRIVILEGED
@@ -32,5 +32,5 @@ def not_privileged(recipe: Recipe, path: str, names: Sequence[str]) -> Iterator[
 
 
 def policy_stage(recipe: Recipe) -> str:
-    """The stage that leaves the policy that is deployed: the last one that trains."""
+    """The stage that trains the deployed policy: `distill` if there is one, else `teacher`."""
     return "distill" if "distill" in recipe.stages else "teacher"

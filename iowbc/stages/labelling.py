@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from iowbc.reference.labels.shards import Shard
 
 SHARES = 4
-"""Pieces for each core: the last ones to end keep the others waiting for a quarter of the time at most."""
+"""Pieces per core, so that cores idle for at most a quarter of the time at the end."""
 
 
 def label_everywhere(
@@ -26,7 +26,7 @@ def label_everywhere(
     interrupted: Callable[[], bool],
     progress: Callable[[int, int], None],
 ) -> "Shard":
-    """As `label_all`, the shards that are missing made by other machines, several in a piece."""
+    """Like `label_all`, but other machines make the missing shards, several per piece."""
     from iowbc.reference.labels.pool import label_all
     from iowbc.reference.labels.shards import cut, read_shard
 
@@ -58,13 +58,13 @@ def label_everywhere(
 def label_share(
     task: "LabelTask", chunks: Sequence[Sequence[int]], key: str, chunk_size: int, *, robot: Path
 ) -> list[bytes]:
-    """The shards of some chunks, as they stand on disk; in a process of their own, for a solver may bring it down."""
+    """File contents of the shards of some chunks, made in a separate process, which a solver may crash."""
     from iowbc.reference.labels.pool import label_all
 
     with tempfile.TemporaryDirectory(prefix="iowbc-labels-") as folder:
         label_all(
             replace(task, robot=robot),
-            [index for chunk in chunks for index in chunk],  # all but the last are full: cut anew, they are the same
+            [index for chunk in chunks for index in chunk],  # only the last may be short: cut again, they are equal
             folder=Path(folder),
             key=key,
             chunk_size=chunk_size,

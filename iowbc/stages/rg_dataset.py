@@ -9,7 +9,7 @@ from iowbc.pipeline.stage import Job, Presentation, Stage
 from iowbc.stages.labelling import label_everywhere
 
 LABELLED = "labelled.npz"
-"""The map of commands that have labels; `feasible.npz` of rg-fit is the part of it where the network moves gently."""
+"""Map of commands with labels; `feasible.npz` of rg-fit is its part without jumps of the network."""
 CHUNK = {"static": 256, "ocp": 8}
 """Samples in a shard: one to three seconds of work, which is what an interruption or a crash costs."""
 

@@ -23,7 +23,7 @@ PANELS = (
 
 
 def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
-    """No student below the skill, or a human whom nobody meets."""
+    """Problems: no trained student, or the learnt human among the scripted training partners."""
     if not leaves_student(recipe):
         text = "names skill, and no stage of the recipe trains a student to act below it; add `distill` to its stages"
         yield "stages", text
@@ -76,7 +76,7 @@ def _note(values: Mapping[str, float]) -> str:
 GOLDEN_DECISIONS = 10
 """Decisions of all games whose observations are the golden vectors."""
 KINDS = ("scripted", "learnt")
-"""Of humans."""
+"""Kinds of humans."""
 GAME = tuple(
     f"skill.{part}"
     for part in (

@@ -23,7 +23,7 @@ RIVALS = {
 
 
 def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
-    """No student below, nothing to compare, or names of unknown tasks."""
+    """Problems: no trained student or skill, or unknown tasks or scenes."""
     asked = recipe.skill.eval
     if not leaves_student(recipe):
         yield "stages", "names skill-eval, and no stage of the recipe trains a student to act below; add `distill`"

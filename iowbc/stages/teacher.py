@@ -43,7 +43,7 @@ PANELS = (
 
 
 def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
-    """Names that s_priv does not hold, or that two parts of it have."""
+    """Problems: names that are not in s_priv, or that are taken twice."""
     yield from not_privileged(recipe, "teacher.value_only", recipe.teacher.value_only)
     if recipe.task.observation.own:
         from iowbc.task.own_parts import taken_names
@@ -124,7 +124,7 @@ def run(job: Job) -> None:
 
 
 def _begin(training: "TeacherTraining", environments: "VectorEnv", start: Path) -> None:
-    """Gives a training what another one has learnt. Raises StageFailed where that sees or does something else."""
+    """Initialise a training from another one's network. Raises StageFailed if the observations differ."""
     from iowbc.learning.storage import load_network
 
     network, about = load_network(start)
@@ -132,12 +132,12 @@ def _begin(training: "TeacherTraining", environments: "VectorEnv", start: Path) 
         path, _ = training.settings.beginning
         raise StageFailed(f"{path}: that policy observes something else; leave the observation as it was")
     training.begin(network)
-    if "curriculum" in about:  # students of earlier versions left none
+    if "curriculum" in about:  # missing in students of earlier versions
         environments.set_curriculum(about["curriculum"])
 
 
 def check_of(world: "Specification", workers: int) -> "QuickEvaluation":
-    """The recipe's check. What it plays follows from `teacher.check` and the task; `eval` has no part in it."""
+    """The recipe's evaluation during training. It depends on `teacher.check` and the task, not on `eval`."""
     from iowbc.evaluation.trials.quick import QuickEvaluation, quick_trials
     from iowbc.recipe.evaluation.evaluation import Evaluation
     from iowbc.task.specification import Specification

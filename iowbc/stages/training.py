@@ -29,16 +29,16 @@ class Training(Protocol):
         """One rollout and its gradient steps; returns their figures."""
 
     def arrays(self) -> "dict[str, NDArray[Any]]":
-        """Everything that a resumed training needs."""
+        """Complete state for resuming."""
 
     def restore(self, arrays: "Mapping[str, NDArray[Any]]") -> None:
         """Inverse of `arrays`."""
 
 
 STATE = "state.safetensors"
-"""File of an artifact that a longer training goes on from, beside the table of its curves."""
+"""File of an artifact with the state from which a longer training continues, together with its table of curves."""
 CURVES = "curves.jsonl"
-"""Curves of a training that goes on."""
+"""File with the curves of an unfinished training."""
 
 
 def rolls_elsewhere(recipe: Recipe) -> bool:
@@ -53,10 +53,10 @@ def train(
     note: Callable[[Mapping[str, float]], str],
     look: Callable[[], None] | None = None,
 ) -> "Curves":
-    """Goes on from the job's checkpoint, or from its predecessor's end, to the end of the training; returns its curves.
+    """Train from the job's checkpoint, from its predecessor's end, or from scratch; returns the curves.
 
-    `checkpoint_every`: updates between two checkpoints; `note`: what to say beside the progress, from the figures of an
-    update; `look`: called after each. Raises Interrupted, with a checkpoint written, once the job is asked to stop.
+    `checkpoint_every`: updates between two checkpoints; `note`: text of the progress, from an update's metrics; `look`:
+    called after each update. Raises Interrupted, after writing a checkpoint, once a stop is requested.
     """
     from safetensors.numpy import load_file
 
@@ -92,7 +92,7 @@ def train(
 
 
 def leave_extendable(job: Job, training: Training) -> None:
-    """Leaves the state in which a training ended, so that a longer one can go on from it."""
+    """Write the final state of a training, from which a longer one can continue."""
     import numpy as np
     from safetensors.numpy import save_file
 

@@ -38,7 +38,7 @@ from iowbc.task.vector.shared import Buffers
 
 
 class Batch:
-    """n environments. `reset` and `step` read the actions from the buffers and leave everything else there."""
+    """n environments. `step` reads the actions from the buffers; `reset` and `step` write all results there."""
 
     def __init__(
         self,
@@ -53,7 +53,7 @@ class Batch:
     ) -> None:
         """`environments`: global indices, (n,); `scenes`: their scenes, by name.
 
-        `episodes`: one an environment, or none to draw them as in training. `divergences`: folder in which diverged
+        `episodes`: one per environment; None draws them as in training. `divergences`: folder in which diverged
         simulations are kept for replay.
         """
         recipe, task = specification.recipe, specification.recipe.task
@@ -107,11 +107,11 @@ class Batch:
         self._divergences = divergences
 
     def targets(self, action: Array) -> Array:
-        """Joint targets of an action (n, 15) in the step to come, (n, joints) [rad]."""
+        """Joint targets of an action (n, 15) in the next step, (n, joints) [rad]."""
         return self.guidance.targets(self.memory, action.clip(-self._bound, self._bound))
 
     def reset(self, seeds: NDArray[np.uint64] | None = None) -> None:
-        """Starts an episode in every environment; with `seeds` (n,) all that is random starts anew from them."""
+        """Starts an episode in every environment; `seeds` (n,) reseed all random number streams."""
         if seeds is not None:
             self._schedule.reseed(seeds)
             self.simulation.reseed(self._schedule.key)
@@ -209,7 +209,7 @@ class Batch:
         return moved
 
     def _observe(self, moved: Motion, which: Indices | slice = EVERY) -> None:
-        """Writes s_t and s_priv of some environments among all."""
+        """Writes s_t and s_priv of some environments."""
         memory, simulation, layout = self.memory, self.simulation, self.layout
         self._joint_reference[:, self._support] = memory.support
         self._joint_reference[:, self._arms] = memory.arms
@@ -242,7 +242,7 @@ class Batch:
         self._schedule.set_levels(levels)
 
     def snapshot(self) -> dict[str, Array]:
-        """Everything that the future depends on, a row an environment."""
+        """Complete state, one row per environment."""
         schedule = self._schedule
         own = vars(self.memory) | {"key": schedule.key, "episode_key": schedule.episode_key}
         saved = {f"task/{name}": values.copy() for name, values in own.items()}
@@ -250,7 +250,7 @@ class Batch:
         return saved | self.simulation.snapshot()
 
     def restore(self, saved: Mapping[str, Array]) -> None:
-        """Inverse of `snapshot`: the environments then take bit for bit the same course."""
+        """Inverse of `snapshot`: the environments then continue bit for bit."""
         for name, values in vars(self.memory).items():
             values[...] = saved[f"task/{name}"]
         schedule = self._schedule

@@ -1,4 +1,4 @@
-"""The curriculum: how hard the world is at the levels of its axes, and how an environment's levels move."""
+"""The curriculum: difficulty at the levels of its axes, and updates of an environment's levels."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ POSTURE, LOCOMOTION, LOAD, DISTURBANCE = range(len(AXES))
 OWN_RANGES = 1.0
 """Level at which the recipe's ranges are used in full; above it commands and loads may be infeasible."""
 ROUNDING = 1e-9
-"""Sums of rises reach a ceiling to within this."""
+"""Tolerance for comparing levels, which are sums of rises."""
 
 
 @dataclass(frozen=True)
@@ -31,28 +31,28 @@ class Difficulty:
 
 @dataclass(frozen=True)
 class EpisodeOutcome:
-    """How the episodes of n environments went, each (n,)."""
+    """Results of the episodes of n environments, each (n,)."""
 
     survived: Mask
     """Reached the time limit."""
     progress_in_time: Array
-    """Part of the time limit that was reached."""
+    """Fraction of the time limit that was reached."""
     posture: Array
     """The worse of the mean scores of height and pitch, 0 to 1."""
     walked: Array
     """Time with a commanded velocity [s]."""
     covered: Array
-    """Part of the commanded displacement that was covered; 1 without any."""
+    """Fraction of the commanded displacement that was covered; 1 if none was commanded."""
     heading: Array
     """Mean heading error [rad]."""
     infeasible: Mask
-    """Was to push what resists more than feet can hold against."""
+    """The crate's rolling resistance exceeded the friction of the feet."""
     stepping: Mask
-    """Was to walk at the end."""
+    """The gait clock was running at the end."""
     lagged: Mask
     """Ended because it lagged behind the command."""
     disturbed: Mask
-    """An impulse or a push had just acted at the end."""
+    """An impulse or a push acted shortly before the end."""
 
 
 def initial_levels(curriculum: Curriculum, n: int) -> Array:
@@ -61,7 +61,7 @@ def initial_levels(curriculum: Curriculum, n: int) -> Array:
 
 
 def played_levels(curriculum: Curriculum, levels: Array, walking: Mask) -> Array:
-    """Levels that an episode is played at, (n, axes): where it walks, nothing runs far ahead of locomotion."""
+    """Effective levels of an episode, (n, axes): if it walks, none exceeds that of locomotion by more than `lead`."""
     most = levels[:, LOCOMOTION] + curriculum.lead
     held_back: Array = np.where(walking[:, None], np.minimum(levels, most[:, None]), levels)
     held_back[:, LOCOMOTION] = levels[:, LOCOMOTION]
@@ -86,14 +86,14 @@ def _scaled(scale: Scale, level: Array) -> Array:
 
 
 def phase(curriculum: Curriculum, levels: Array) -> Array:
-    """Phase 1, 2 or 3 that each environment is in, (n,): it has reached all ceilings of those before."""
+    """Phase of each environment, 1 to 3, (n,): all ceilings of the earlier phases have been reached."""
     first = _reached(curriculum.balance, levels, curriculum.limit)
     second = first & _reached(curriculum.locomotion, levels, curriculum.limit)
     return 1 + first.astype(np.int64) + second
 
 
 def next_levels(curriculum: Curriculum, levels: Array, played: Array, outcome: EpisodeOutcome) -> Array:
-    """Levels after an episode, (n, axes). An axis that was held back below its own level says nothing, and stays."""
+    """Levels after an episode, (n, axes). An axis whose effective level was capped keeps its level."""
     if not curriculum.enabled:
         return levels
     own = played >= levels - ROUNDING

@@ -1,4 +1,4 @@
-"""When an episode ends, and why: falls, drops, time limits, divergence."""
+"""Conditions that end an episode: falls, drops, lag behind the command, time limits, divergence."""
 
 from dataclasses import dataclass
 from typing import Self
@@ -12,7 +12,7 @@ from iowbc.task.motion import Motion
 
 @dataclass(frozen=True)
 class Ending:
-    """Why episodes end in a step, each (n,). What diverged neither fell nor dropped anything."""
+    """Reasons for which episodes end in a step, each (n,). A diverged one is neither fallen, dropped nor lagging."""
 
     fallen: Mask
     dropped: Mask
@@ -36,11 +36,11 @@ class Ending:
 
     @property
     def truncated(self) -> Mask:
-        """Reached the time limit, and nothing worse."""
+        """Reached the time limit without failing or diverging."""
         return self.time_limit & ~(self.failed | self.diverged)
 
     def reasons(self) -> dict[str, Mask]:
-        """Exactly one reason for each that ended."""
+        """Exactly one reason for each episode that ended."""
         return {
             "fallen": self.fallen,
             "dropped": self.dropped & ~self.fallen,

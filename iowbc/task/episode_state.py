@@ -1,4 +1,4 @@
-"""What the task remembers of each environment between two control steps."""
+"""State of the task of each environment between two control steps."""
 
 from dataclasses import dataclass, fields
 from typing import Any, Self
@@ -12,14 +12,14 @@ from iowbc.task.rewards.table import TRACKED
 
 COUNTERS = ("episode", "draws", "steps", "limit", "goal_until", "undisturbed", "walked")
 FLAGS = ("walking", "infeasible", "failed", "stepping")
-"""Integers, and truths; everything else is real but for `failed_key`."""
+"""Integer and boolean fields; all others but `failed_key` are float64."""
 OF_EPISODE = (
     *("action", "earlier_action", "filtered_velocity", "excess_force", "lag", "tracking"),
     *("walked", "commanded", "covered", "heading_error", "total"),
 )
-"""What begins at zero with every episode."""
+"""Fields that are zero at the start of an episode."""
 LONG_AGO = 1_000_000
-"""Control steps since something that has not happened yet."""
+"""Control steps since a disturbance that has not happened yet."""
 
 
 @dataclass
@@ -39,19 +39,19 @@ class EpisodeState:
     level: Array
     """Curriculum levels, (n, axes); see `iowbc.task.curriculum.AXES`."""
     played: Array
-    """Levels that the episode is played at, (n, axes)."""
+    """Effective levels of the episode, (n, axes); see `iowbc.task.curriculum.played_levels`."""
     walking: Array
-    """Whether the episode has commands to walk, (n,) bool."""
+    """Whether the episode commands velocities, (n,) bool."""
     infeasible: Array
-    """Whether the episode's crate resists more than the feet can hold against, (n,) bool."""
+    """Whether the crate's rolling resistance exceeds the friction of the feet, (n,) bool."""
     failed: Array
-    """Whether the episode of `failed_key` is still to be survived, (n,) bool."""
+    """Whether the episode of `failed_key` has not been survived since, (n,) bool."""
     failed_key: Array
-    """Key of the last new episode that failed, (n,) uint64."""
+    """Key of the last failed episode, (n,) uint64."""
     command: Array
     """C in force, rate-limited and clamped, (n, 11)."""
     goal: Array
-    """Where the command goes, (n, 11)."""
+    """Goal that the command approaches, (n, 11)."""
     height_rate: Array
     """Rate of change of the commanded height, (n,) [m/s]."""
     phase: Array
@@ -76,13 +76,13 @@ class EpisodeState:
     excess_force: Array
     """Low-passed horizontal force on the hands beyond what the transport needs, heading frame, (n, 2) [N]."""
     heading_offset: Array
-    """Measured less true heading at the start of the episode, (n,) [rad]: the origin of what is measured."""
+    """Measured less true heading at the start of the episode, (n,) [rad]: the origin of the measured heading."""
     heading_reference: Array
     """Heading at the start plus the integrated commanded yaw rate, (n,) [rad]."""
     object_place: Array
-    """A held object from the middle of the wrist targets at the start of the episode, heading frame, (n, 3) [m]."""
+    """Offset of a held object from the middle of the wrist targets at the start, heading frame, (n, 3) [m]."""
     lag: Array
-    """How far robot and object are behind the command, forgotten in time, (n,) [m]."""
+    """Leaky integral of the speed lacking along the command, of robot and object, (n,) [m]."""
     undisturbed: Array
     """Control steps since an impulse or a push last acted, (n,) int64."""
     tracking: Array
@@ -92,7 +92,7 @@ class EpisodeState:
     commanded: Array
     """Displacement that the episode commanded, (n,) [m]."""
     covered: Array
-    """Displacement along the command, no faster than it, (n,) [m]."""
+    """Displacement along the command, at no more than the commanded speed, (n,) [m]."""
     heading_error: Array
     """Sum of the absolute heading errors of the episode, (n,) [rad]."""
     total: Array
@@ -109,7 +109,7 @@ class EpisodeState:
         return cls(**{name: np.zeros(shape, kinds.get(name, np.float64)) for name, shape in shapes.items()})
 
     def clear(self, which: Indices) -> None:
-        """Forgets what belongs to the episode that has ended in some environments, (k,)."""
+        """Resets the fields of the last episode in some environments, (k,)."""
         for name in OF_EPISODE:
             getattr(self, name)[which] = 0
         self.undisturbed[which] = LONG_AGO

@@ -1,4 +1,4 @@
-"""One planned episode: scene, seed, what is held fixed, and the commands it plays."""
+"""Planned episodes: scene, seed, fixed quantities and scripted commands."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
@@ -51,9 +51,9 @@ class Episode:
     fixed: Mapping[str, float] = field(default_factory=dict)
     """Randomised quantities held at a value, by name."""
     script: CommandScript | None = None
-    """The commands; without, they are drawn as in training."""
+    """The commands; None draws them as in training."""
     push: PlannedPush | None = None
-    """A push on the base beside those that are drawn."""
+    """A push on the base in addition to the drawn ones."""
     pull: PlannedPull | None = None
     """A pull on the object."""
 

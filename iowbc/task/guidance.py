@@ -1,4 +1,4 @@
-"""Guidance: what the robots are to follow. The command, the gait clock, and the joint references that come of them."""
+"""Guidance of the robots: the command, the gait clock, and the joint references that follow from both."""
 
 from collections.abc import Sequence
 
@@ -19,7 +19,7 @@ from iowbc.task.specification import Specification
 
 
 class Guidance:
-    """Commands, gait clocks and references of n environments, kept in their memory."""
+    """Commands, gait clocks and references of n environments, kept in their `EpisodeState`."""
 
     def __init__(
         self,
@@ -32,9 +32,9 @@ class Guidance:
         scripts: Sequence[CommandScript | None],
         period: float,
     ) -> None:
-        """`scenes`: name of each environment's.
+        """`scenes`: scene of each environment, by name.
 
-        `holding`: those that begin with an object in the hands, `pushing`: those with a crate before them, (n,).
+        `holding`: those that begin with an object in the hands, `pushing`: those with a crate in front of them, (n,).
         """
         task = specification.recipe.task
         self._period = period
@@ -44,12 +44,12 @@ class Guidance:
         """Base grasp of both wrists, heading frame, (n, 2, 3) [m]."""
         self._load = np.array([getattr(task.references.loads, name) for name in scenes])
         self._frames: Frames | None = None
-        """Of the arms' references in the step being made: from its targets to the references of the next."""
+        """Arm frames at the current references: computed for the targets, reused for the next references."""
         self._support, self._arms = as_slice(robot.support), as_slice(robot.interaction)
         self._joints, self._scale = len(robot.joints), action_scale(robot, task.action)
 
     def start(self, which: Indices, memory: EpisodeState, key: Keys) -> tuple[Array, Array]:
-        """Begins new episodes with keys (k,): joints (k, joints) and pitch of the base (k,) to start in [rad]."""
+        """Starts episodes with keys (k,). Returns initial joint positions (k, joints) and base pitch (k,) [rad]."""
         self.commander.start(which, memory, key)
         command = memory.command[which]
         arms, posture = self.references.start(command, self.grasp[which])
@@ -63,7 +63,7 @@ class Guidance:
         return joints, self.references.start_pitch(posture, command)
 
     def advance(self, memory: EpisodeState, key: Keys, measured: Measured) -> None:
-        """Command, references and gait clock of the step to come; keys of the episodes, (n,)."""
+        """Command, references and gait clock of the next step; keys of the episodes, (n,)."""
         period = self._period
         height = memory.command[:, HEIGHT].copy()
         self.commander.advance(memory, key)
@@ -84,7 +84,7 @@ class Guidance:
         memory.heading_reference += memory.command[:, YAW_RATE] * self._period
 
     def targets(self, memory: EpisodeState, action: Array) -> Array:
-        """Joint targets of an action (n, 15) in the step to come, (n, joints) [rad]: θ_S_ref + scale·a, θ_I_ref.
+        """Joint targets of an action (n, 15) in the next step, (n, joints) [rad]: θ_S_ref + scale·a, θ_I_ref.
 
         The action is within its bounds.
         """
@@ -97,6 +97,6 @@ class Guidance:
         return target
 
     def object_place(self, memory: EpisodeState) -> Array:
-        """Where a held object belongs, from the base, heading frame, (n, 3) [m]: it follows the wrist targets."""
+        """Target position of a held object from the base, heading frame, (n, 3) [m]: it follows the wrist targets."""
         wrists = self.references.wrists(memory.command, self.grasp)
         return 0.5 * (wrists[:, 0] + wrists[:, 1]) + memory.object_place

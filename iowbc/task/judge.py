@@ -29,13 +29,13 @@ class Judgement:
     ending: Ending
     scored: Scored
     command: Array
-    """C that was in force, (n, 11)."""
+    """C during the step, (n, 11)."""
     heading_error: Array
     """Heading less its reference, (n,) [rad]."""
 
 
 class Judge:
-    """Judges the control steps of n environments by a recipe."""
+    """Evaluates the control steps of n environments."""
 
     def __init__(
         self,
@@ -47,9 +47,9 @@ class Judge:
         training: bool,
         period: float,
     ) -> None:
-        """`support`: places of the support joints; `lateral`: places among them, see `Robot.lateral`; `holding`:
-        environments that begin with an object in the hands, (n,); `training`: execute the reward's terms in a user's
-        file, and end the episodes of robots that stand instead of walking, or lose their crate."""
+        """`support`: indices of the support joints; `lateral`: indices among them, see `Robot.lateral`; `holding`:
+        environments that begin with an object in the hands, (n,); `training`: execute user-defined reward terms, and
+        end the episodes of robots that lag behind the command or lose their crate."""
         self._task, self._height = recipe.task, recipe.rg.height
         self._support, self._lateral = support, lateral
         self._holding, self._training, self._period = holding, training, period
@@ -70,10 +70,10 @@ class Judge:
         disturbed: Mask,
         resistance: Array,
     ) -> Judgement:
-        """The step just made with an action (n, 15).
+        """Evaluates the last step, made with an action (n, 15).
 
-        `place`: where a held object belongs, (n, 3) [m]; `disturbed`: where an impulse or a push acted, (n,);
-        `resistance`: of a crate's wheels, (n,) [N].
+        `place`: target position of a held object, (n, 3) [m]; `disturbed`: whether an impulse or a push acted, (n,);
+        `resistance`: rolling resistance of a crate, (n,) [N].
         """
         moved = self.motion(state)
         self._filter(memory, moved, resistance * (1.0 - state.partner_share))
@@ -112,7 +112,7 @@ class Judge:
         return Judgement(moved, ending, scored, memory.command.copy(), error)
 
     def _filter(self, memory: EpisodeState, moved: Motion, resistance: Array) -> None:
-        """Velocities, and the force on the hands beyond the robot's share of a crate's `resistance` (n,) [N]."""
+        """Low-passes velocities, and the hand force beyond the robot's share of a crate's `resistance` (n,) [N]."""
         self._velocity[:, :YAW_RATE] = moved.system_velocity[:, :YAW_RATE]
         self._velocity[:, YAW_RATE] = moved.yaw_rate
         time_constant = self._task.reward.sync.filter_time

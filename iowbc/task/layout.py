@@ -1,4 +1,4 @@
-"""The rows that the environments deliver: s_t, then s_priv."""
+"""Layout of the environments' observation rows: s_t, then s_priv."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from iowbc.task.privileged import PrivilegedLayout, privileged_layout
 
 @dataclass(frozen=True)
 class FullLayout:
-    """Where s_t, s_priv and their parts lie in a row."""
+    """Places of s_t, s_priv and their parts in a row."""
 
     state: ObservationLayout
     extra: PrivilegedLayout
@@ -47,7 +47,7 @@ class FullLayout:
 
     @cached_property
     def slices(self) -> dict[str, slice]:
-        """Place of each part; a part of s_priv goes by `privileged/<name>`."""
+        """Place of each part; a part of s_priv is named `privileged/<name>`."""
         shift = self.state.size
         privileged = {f"privileged/{k}": slice(s.start + shift, s.stop + shift) for k, s in self.extra.slices.items()}
         return self.state.slices | privileged
@@ -59,7 +59,6 @@ class FullLayout:
 
 
 def full_layout(recipe: Recipe, robot: Robot) -> FullLayout:
-    """Layout of the rows that the environments of a recipe deliver. Raises StageFailed for a part of the recipe's own
-    that cannot have its name."""
+    """Layout of the observation rows of a recipe. Raises StageFailed for a user-defined part whose name is taken."""
     seen = recipe.task.observation
     return FullLayout(observation_layout(robot, seen.observe_object), privileged_layout(robot, own_parts(seen)))

@@ -1,4 +1,4 @@
-"""How the robot and the object move, seen from the heading frame: what reward, terminations and signals look at."""
+"""Motion of robot and object in the heading frame: the input of reward, terminations and signals."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -22,11 +22,11 @@ class Motion:
     base_velocity: Array
     """Velocity of the pelvis, (n, 3) [m/s]."""
     yaw_rate: Array
-    """Turning of the base about the vertical, (n,) [rad/s]."""
+    """Yaw rate of the base, (n,) [rad/s]."""
     pelvis_height: Array
     """(n,) [m]."""
     height: Array
-    """The height that H commands: that of the pelvis, or the robot's centre of mass by recipe, (n,) [m]."""
+    """Height that H commands: of the pelvis or the robot's centre of mass, by recipe, (n,) [m]."""
     pelvis_tilt: Array
     """Angle of the pelvis from upright, (n,) [rad]."""
     torso_pitch: Array
@@ -34,11 +34,11 @@ class Motion:
     torso_roll: Array
     """(n,) [rad]."""
     foot_position: Array
-    """Soles from the base, (n, 2, 3) [m]."""
+    """Soles relative to the base, (n, 2, 3) [m]."""
     foot_force: Array
     """Force of the ground on each foot, (n, 2, 3) [N]."""
     object_offset: Array
-    """Object from the base, (n, 3) [m]; zero without an object."""
+    """Object relative to the base, (n, 3) [m]; zero without an object."""
     hand_force: Array
     """Force of the object on both hands together, (n, 3) [N]."""
     external_force: Array

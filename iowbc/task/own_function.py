@@ -1,4 +1,4 @@
-"""Functions in a user's file: executed when they are loaded, and checked for what they must return."""
+"""User-defined functions: their file is executed on loading, and their return values are checked."""
 
 import functools
 import linecache
@@ -14,11 +14,11 @@ from iowbc.errors import StageFailed, nearest
 from iowbc.recipe.beside import ModuleFile, OwnFunction
 
 Source = TypeVar("Source")
-"""What a function takes."""
+"""Type of a function's argument."""
 ArrayShape = tuple[int | None, ...]
-"""Of an array; None where any length will do."""
+"""Shape of an array; None stands for any length."""
 LARGEST = float(np.finfo(np.float32).max)
-"""Observations and rewards are float32, in which more is infinite."""
+"""Largest finite float32, the type of observations and rewards."""
 
 
 @dataclass(frozen=True)
@@ -26,16 +26,16 @@ class CheckedFunction(Generic[Source]):
     """A function whose values are checked against its contract."""
 
     where: str
-    """Its place: path in the recipe, file, name."""
+    """Location for error messages: path in the recipe, file, function name."""
     contract: str
-    """What it takes and returns, in words."""
+    """Description of argument and return value."""
     file: ModuleFile
     function: Callable[[Source], Any]
 
     def __call__(self, source: Source, *shapes: ArrayShape, excused: Mask | None = None) -> Array:
-        """Its values, of one of the shapes, (n, ...). `excused`: rows that need not be finite, (n,).
+        """Values of the function, of one of the shapes, (n, ...). `excused`: rows that need not be finite, (n,).
 
-        Raises StageFailed where it raises, or returns something else.
+        Raises StageFailed if the function raises or returns anything else.
         """
         try:
             found = np.asarray(self.function(source), np.float64)
@@ -90,7 +90,7 @@ def _executed(file: ModuleFile) -> Any:
 
 
 def _told(error: Exception, file: ModuleFile) -> str:
-    """An error of the user's code, with the last line of the file that led to it."""
+    """Message of an error in the user's code, with the last line of the file in its traceback."""
     text = error.msg if isinstance(error, SyntaxError) else str(error)
     lines = [error.lineno] if isinstance(error, SyntaxError) else []
     trace = error.__traceback__

@@ -1,4 +1,4 @@
-"""Parts of s_priv in a user's file. Its execution waits until a row is filled: who reads a layout executes nothing."""
+"""User-defined parts of s_priv. Their file is executed when a row is filled, not when a layout is read."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -35,7 +35,7 @@ class OwnValue:
 
 
 def own_parts(recipe: Observation) -> tuple[Part[Truth], ...]:
-    """The recipe's own parts in alphabetical order, for a key does not know in which they were written.
+    """The user-defined parts in alphabetical order, because cache keys do not depend on their order in the recipe.
 
     Raises StageFailed for a name that is taken.
     """
@@ -51,7 +51,7 @@ def load_parts(recipe: Observation) -> None:
 
 
 def taken_names(recipe: Observation) -> Iterator[tuple[str, str]]:
-    """Dotted paths of own parts that have the name of another one, and what is wrong there."""
+    """Dotted paths of user-defined parts whose name is taken, with error messages."""
     known = [part.name for part in PRIVILEGED]
     for name in recipe.own:
         if name in known:
@@ -59,8 +59,8 @@ def taken_names(recipe: Observation) -> Iterator[tuple[str, str]]:
 
 
 def _part(name: str, said: OwnPart) -> Part[Truth]:
-    """Its unit and its frame, which only its author knows, are told by what they follow from: with another file or
-    other signs it is another observation."""
+    """Only the author knows unit and frame. The hash of the file and the mirror signs replace them, so that a change of
+    either makes another observation."""
     unit = f"of {said.function} in {said.module.sha256[:12]}"
     frame = f"mirror {', '.join(map(str, said.mirror))}"
     return Part(name, in_place(*said.mirror), unit, frame, OwnValue(_path(name), said))

@@ -1,4 +1,4 @@
-"""Pushes on the base and pulls on the object at set times, for trials that ask how a policy responds."""
+"""Pushes on the base and pulls on the object at set times, for trials of a policy's response."""
 
 from collections.abc import Sequence
 
@@ -40,7 +40,7 @@ class PlannedPulls:
         self._period = period
 
     def force(self, step: Indices, heading: Array) -> Array:
-        """World force over the period that begins at `step` (n,), taken in its middle, (n, 3) [N]; `heading`:
+        """World force over the period that begins at `step` (n,), evaluated at its midpoint, (n, 3) [N]; `heading`:
         commanded, (n,) [rad]."""
         time = (step + 0.5) * self._period
         acting = (time > self._begin) & (time < self._end)
@@ -50,6 +50,6 @@ class PlannedPulls:
 
 
 def _in_world(forward: Array, left: Array, heading: Array) -> Array:
-    """World vectors (n, 3) of horizontal ones in a heading frame."""
+    """Horizontal vectors of a heading frame as world vectors, (n, 3)."""
     cosine, sine = np.cos(heading), np.sin(heading)
     return np.stack([cosine * forward - sine * left, sine * forward + cosine * left, np.zeros(len(heading))], axis=1)

@@ -1,6 +1,6 @@
-"""What the teacher alone sees (paper III-C: s_priv): one list of the truth about load, contact and forces.
+"""Privileged observation of the teacher, s_priv (paper III-C): one list of its parts about load, contact and forces.
 
-To add a part, write a function that computes it from `Truth` and a line of the list.
+To add a part, write a function that computes it from `Truth` and add a line to the list.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -25,14 +25,14 @@ from iowbc.task.motion import Motion
 
 @dataclass(frozen=True)
 class Truth:
-    """What the simulation knows of n environments; what parts of s_priv are computed from."""
+    """True state of n environments, from which the parts of s_priv are computed."""
 
     motion: Motion
     state: SimulationState
     drawn: Mapping[str, Array]
     """Drawn quantities by name, (n,) or (n, k)."""
     motor_effort: Array
-    """What each motor or linkage can give in the episode, (n, joints) [N·m]."""
+    """Torque limit of each motor or linkage in the episode at low speed, (n, joints) [N·m]."""
 
 
 def _drawn(name: str) -> Callable[[Truth], Array]:
@@ -70,5 +70,5 @@ PrivilegedLayout = Layout[Truth]
 
 
 def privileged_layout(robot: Robot, own: Sequence[Part[Truth]] = ()) -> PrivilegedLayout:
-    """Layout of s_priv; `own`: parts of a recipe's own, which come last."""
+    """Layout of s_priv; `own`: user-defined parts, which come last."""
     return Layout((*PRIVILEGED, *own), robot)

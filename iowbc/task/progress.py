@@ -1,4 +1,4 @@
-"""How an episode goes: what was commanded and what came of it, summed for the curriculum."""
+"""Progress of an episode: sums of commanded and achieved motion, for the curriculum."""
 
 import numpy as np
 
@@ -15,8 +15,8 @@ from iowbc.task.rewards.terms import progress
 def follow(
     memory: EpisodeState, target: Array, error: Array, disturbed: Mask, termination: Termination, period: float
 ) -> None:
-    """Takes the step just made, of `period` [s], into the sums; `target`: velocity asked for, heading frame, (n, 2)
-    [m/s]; `error`: of the heading, (n,) [rad]."""
+    """Adds the last step, of `period` [s], to the sums; `target`: target velocity, heading frame, (n, 2) [m/s];
+    `error`: heading error, (n,) [rad]."""
     speed = np.hypot(target[:, 0], target[:, 1])
     along = progress(memory.filtered_velocity[:, :YAW_RATE], target)
     memory.walked += memory.command[:, VELOCITY].any(axis=1)
@@ -29,7 +29,7 @@ def follow(
 
 
 def outcome(memory: EpisodeState, ending: Ending, period: float, blame: float) -> EpisodeOutcome:
-    """How the episodes went that end in this step; `blame`: time after a disturbance within which it counts [s]."""
+    """Results of the episodes that end in this step; `blame`: time for which a disturbance counts as recent [s]."""
     steps = np.maximum(memory.steps, 1)
     moved = memory.commanded > TINY
     return EpisodeOutcome(

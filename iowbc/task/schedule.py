@@ -1,4 +1,4 @@
-"""Which episode each environment plays: drawn ones that the curriculum makes harder, or planned trials."""
+"""Schedules the episodes of each environment: random ones with a curriculum, or planned trials."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -29,7 +29,7 @@ class Schedule:
         trials: Sequence[Episode] | None,
         period: float,
     ) -> None:
-        """`environments`: global indices, (n,); `trials`: one an environment; without, episodes are drawn."""
+        """`environments`: global indices, (n,); `trials`: one per environment; None draws episodes at random."""
         n = len(environments)
         self._task, self._memory, self._trials, self._period = task, memory, trials, period
         self.seeds, self.streams = np.full(n, seed, np.uint64), environments
@@ -37,14 +37,14 @@ class Schedule:
             self.seeds = np.array([episode.seed for episode in trials], np.uint64)
             self.streams = np.zeros(n, np.int64)
         self.key = random.environment_key(self.seeds, self.streams)
-        """Key of all that is random in each environment, (n,)."""
+        """Random key of each environment, (n,)."""
         self.episode_key = self.key.copy()
-        """Key of all that is random in each environment's episode, (n,)."""
+        """Random key of each environment's current episode, (n,)."""
         memory.level[:] = initial_levels(task.curriculum, n) if trials is None else task.curriculum.fixed_level
 
     @property
     def fixed(self) -> dict[str, Array]:
-        """What each trial holds fixed, by name, (n,); NaN where it leaves a quantity to be drawn."""
+        """Quantities that each trial holds fixed, by name, (n,); NaN where they are drawn."""
         trials = self._trials or ()
         names = sorted({name for episode in trials for name in episode.fixed})
         return {name: np.array([episode.fixed.get(name, np.nan) for episode in trials]) for name in names}
@@ -59,11 +59,11 @@ class Schedule:
         return self._trials is not None
 
     def reseed(self, seeds: NDArray[np.uint64]) -> None:
-        """All that is random starts anew from seeds (n,)."""
+        """Reseeds all random number streams from seeds (n,)."""
         self.key[:] = random.environment_key(seeds, np.zeros(len(seeds), np.int64))
 
     def start(self, which: Indices) -> Keys:
-        """Begins new episodes: their keys, (k,)."""
+        """Starts new episodes and returns their keys, (k,)."""
         memory = self._memory
         memory.episode[which] += 1
         key = self._replayed(which, random.absorb(self.key[which], memory.episode[which]))
@@ -85,7 +85,7 @@ class Schedule:
         return np.where(again, memory.failed_key[which], key)
 
     def scales(self, which: Indices, key: Keys) -> dict[str, Array]:
-        """How hard the simulation is to make new episodes, by name, (k,); trials say it themselves."""
+        """Difficulty scales of new episodes for the simulation, by name, (k,); none for trials."""
         if self._trials is not None:
             return {}
         hardness = difficulty(self._task.curriculum, self._memory.played[which])
@@ -106,14 +106,14 @@ class Schedule:
         return np.maximum(np.round(seconds / self._period), 1).astype(np.int64)
 
     def causes(self, ending: Ending) -> dict[str, Mask]:
-        """What robots were doing that fall in this step, by name, (n,)."""
+        """Situations of the robots that fall in this step, by name, (n,)."""
         memory = self._memory
         pushed = ending.fallen & (memory.undisturbed * self._period <= self._task.curriculum.blame)
         walking = ending.fallen & memory.stepping & ~pushed
         return {"disturbed": pushed, "walking": walking, "standing": ending.fallen & ~walking & ~pushed}
 
     def promote(self, ending: Ending, which: Indices) -> None:
-        """Moves the levels of environments whose episode ended by itself, (k,); trials keep theirs."""
+        """Updates the levels of environments whose episode ended, (k,), unless it diverged; trials keep theirs."""
         if self._trials is not None:
             return
         memory, curriculum = self._memory, self._task.curriculum

@@ -1,4 +1,4 @@
-"""What an environment is made from: a recipe, a robot and a reference generator."""
+"""Specification of environments."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,10 +17,10 @@ class Specification:
     rg: Path | None = None
     """Folder of the fitted reference generator; without one θ_S_ref is the default posture."""
     drake: Drake | None = None
-    """Settings with which Drake takes the physics steps; without, MuJoCo does."""
+    """Settings of Drake as the physics engine; None selects MuJoCo."""
 
     @property
     def deployed(self) -> Self:
-        """The same for a policy that does not see s_priv: without the parts of it that are in a user's file, which
-        nothing then executes."""
+        """The same for a policy that does not see s_priv: without its user-defined parts, whose file is then not
+        executed."""
         return replace(self, recipe=self.recipe.deployed)

@@ -1,4 +1,4 @@
-"""Compliance: the velocity that the force on the hands asks for, v_coll + F/b, and the force beyond it."""
+"""Compliance: target velocity under a force on the hands, v_coll + F/b, and the force beyond it."""
 
 import numpy as np
 
@@ -18,7 +18,7 @@ def excess_force(hand_force: Array, command: Array, needed: Array) -> Array:
 
 
 class Admittance:
-    """The yielding law of n environments."""
+    """Admittance law of n environments."""
 
     def __init__(self, recipe: Yielding, holding: Mask) -> None:
         """`holding`: environments that begin with an object in the hands, (n,); the others push one, or have none."""

@@ -1,4 +1,4 @@
-"""The process of a simulated robot: low-level states out, commands in, in real time or in step with the commands."""
+"""Process of a simulated robot: states out, commands in, in real time or in lock step with the commands."""
 
 import time
 from collections.abc import Callable
@@ -8,7 +8,7 @@ from iowbc.onboard.process import PATIENCE, PERIOD, Bus
 from iowbc.twin.robot import Twin
 
 BATTERY_PERIODS = 250
-"""Periods of the bus between two states of the battery."""
+"""Bus periods between two battery states."""
 
 
 def serve(
@@ -20,9 +20,9 @@ def serve(
     each: Callable[[Twin], None] = lambda _: None,
     answer: Callable[[], None] = lambda: None,
 ) -> None:
-    """Simulates the robot while `going`; `each` is called after every period, `answer` in it.
+    """Simulates the robot while `going`; calls `answer` in and `each` after every period.
 
-    In lock step, a state waits for the command that answers it as long as commands come.
+    In lock step, every state waits for its command, as long as commands come.
     """
     due, following = time.monotonic(), False
     while going():

@@ -1,7 +1,7 @@
-"""A robot in MuJoCo that is driven by low-level commands alone, as the real one is.
+"""A MuJoCo robot controlled only by low-level commands, as the real one.
 
-The world is the recipe's own, with its objects, sensors, delays and motor limits, at 1 kHz and with explicit PD control
-by the gains of each command.
+The world is the recipe's, with its objects, sensors, delays and motor limits, at 1 kHz and with explicit PD control by
+the gains of each command.
 """
 
 import numpy as np
@@ -24,7 +24,7 @@ TIMESTEP = 0.001
 """Physics step [s], and period of the motors' PD control."""
 
 SILENCE = 0.1
-"""Time without commands after which the motors brake [s]; an assumption, for the drives' behaviour is not public."""
+"""Time without commands after which the motors brake [s]; an assumption, since the drives' behaviour is not public."""
 CHARGE, WARM = 90, 35
 """Battery [%] and motor temperature [°C] of a twin."""
 LYING_HEIGHT, LYING_TILT = 0.35, 1.2
@@ -32,7 +32,7 @@ LYING_HEIGHT, LYING_TILT = 0.35, 1.2
 
 
 def at_bus_rate(recipe: SimulationSettings, control_frequency: float) -> SimulationSettings:
-    """The same world with a period of the bus in place of one of the policy; latencies keep their time."""
+    """The same world with the bus's period instead of the policy's; latencies keep their duration."""
     periods = round(FREQUENCY / control_frequency)
     drawn = recipe.randomization
     delays = {
@@ -47,7 +47,7 @@ def at_bus_rate(recipe: SimulationSettings, control_frequency: float) -> Simulat
 
 
 class Twin:
-    """A simulated robot: low-level commands in, low-level states out, a period of the bus at a time."""
+    """A simulated robot: low-level commands in, low-level states out, one bus period at a time."""
 
     def __init__(
         self,
@@ -60,7 +60,7 @@ class Twin:
         support: Support,
         fixed: dict[str, float],
     ) -> None:
-        """`recipe` of the world; `posture` at the start, (joints,) [rad]; `fixed`: quantities that are not drawn."""
+        """`recipe`: of the world; `posture`: initial, (joints,) [rad]; `fixed`: quantities that are not sampled."""
         self.robot, self.support = robot, support
         self._kd = robot.kd
         held = {name: np.array([value]) for name, value in fixed.items()}
@@ -86,10 +86,10 @@ class Twin:
         self._silent = 0
         self._command = messages.empty(messages.LOW_COMMAND)
         self.rejected = 0
-        """Commands with a wrong checksum."""
+        """Number of commands with a wrong checksum."""
 
     def command(self, message: Record) -> None:
-        """Takes in a command; one with a wrong checksum is passed over, as by the robot."""
+        """Accepts a command; ignores one with a wrong checksum, as the robot does."""
         if messages.checksum(message) != message["crc"]:
             self.rejected += 1
             return
@@ -122,7 +122,7 @@ class Twin:
         return place
 
     def _drive(self, kp: Array, kd: Array, target: Array) -> None:
-        """Gains of this period, times what the motors' own differ by, and targets without numbers as none."""
+        """Sets gains, scaled by the sampled motor errors, and targets; a non-finite target keeps its last value."""
         drawn, simulation = self.simulation.drawn, self.simulation
         kp, kd = kp * drawn["kp_scale"][0], kd * drawn["kd_scale"][0]
         self._gain[0, :, 0], self._bias[0, :, 1], self._bias[0, :, 2] = kp, -kp, -kd
@@ -130,7 +130,7 @@ class Twin:
 
     @property
     def time(self) -> float:
-        """Since the simulation began [s]."""
+        """Time since the simulation began [s]."""
         return self.periods / FREQUENCY
 
     @property
@@ -145,14 +145,14 @@ class Twin:
 
     @property
     def fallen(self) -> bool:
-        """Whether the robot lies."""
+        """True if the pelvis is too low or tilted too far."""
         state = self.simulation.state
         low = state.base_position[0, 2] < LYING_HEIGHT
         return bool(low or state.base_rotation[0, 2, 2] < np.cos(LYING_TILT))
 
     @property
     def verdict(self) -> str:
-        """What became of robot and object."""
+        """Summary of robot and object."""
         state = self.simulation.state
         way = float(np.linalg.norm(state.base_position[0, :2]))
         parts = [f"{self.time:.1f} s", "fallen" if self.fallen else "upright", f"pelvis {way:.2f} m from its start"]
@@ -164,9 +164,9 @@ class Twin:
 
 
 def low_state(tick: int, seen: Measured, torque: Array) -> Record:
-    """The state message of what sensors deliver, a row; `tick` [ms]; estimated torques (joints,) [N·m].
+    """State message of a row of measurements; `tick` [ms]; estimated torques (joints,) [N·m].
 
-    It has an orientation for gravity and heading, so that noise in the length of gravity is lost.
+    Gravity and heading are sent as an orientation, which drops noise in the norm of gravity.
     """
     message = messages.empty(messages.LOW_STATE)
     message["mode_machine"], message["tick"] = MODEL, tick

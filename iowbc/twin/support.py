@@ -1,4 +1,4 @@
-"""What holds a robot until it stands by itself: an elastic band, or a fixture that holds robot and object still."""
+"""Support of a robot until it stands: an elastic band, or a fixture that holds robot and object still."""
 
 from typing import Literal
 
@@ -7,13 +7,13 @@ import numpy as np
 from iowbc.arrays import Array
 
 STIFFNESS, DAMPING = 2000.0, 200.0
-"""Of the band along it [N/m], [N·s/m]; it stretches by 0.16 m under a G1."""
+"""Stiffness and damping along the band [N/m, N·s/m]; it stretches by 0.16 m under a G1."""
 SWAY = 30.0
 """Damping across the taut band [N·s/m]; air and bearings damp a hanging robot."""
 HOOK = np.array([0.0, 0.0, 0.35])
-"""Where the robot hangs, torso's frame [m]: between its shoulders."""
+"""Attachment of the band, torso frame [m]: between the shoulders."""
 LENGTH = 1.0
-"""Length of the band between that place of a standing robot and its upper end [m]."""
+"""Length of the band from that point of a standing robot to its upper end [m]."""
 STRETCHED = {"hanging": 0.2, "lowered": 0.12, "slack": -0.2}
 """Stretch of the band with the robot at the height of standing [m]: at first its feet hang 4 cm above the ground;
 lowered, the band bears three quarters of its weight and keeps it upright."""
@@ -22,7 +22,7 @@ LOWERING, SLACKENING = 2.0, 3.0
 
 
 class Support:
-    """Holds at first, is lowered once the joints have their full gains, and lets go `release` seconds after that."""
+    """Holds the robot, lowers it once the joints have their full gains, and lets go `release` seconds after that."""
 
     def __init__(self, kind: Literal["band", "fixture", "none"], release: float) -> None:
         self.kind, self._release = kind, release
@@ -31,7 +31,7 @@ class Support:
         self._was_rigid = self.rigid
 
     def advance(self, period: float, stiff: bool) -> None:
-        """A period [s]; `stiff`: the joints have their full gains. Once released, it stays so."""
+        """Advances by a period [s]; `stiff`: the joints have their full gains. A release is final."""
         self._time += period if stiff or self._time >= self._release else 0.0
         self.just_released = self._was_rigid and not self.rigid
         self._was_rigid = self.rigid
@@ -42,16 +42,16 @@ class Support:
 
     @property
     def waits(self) -> bool:
-        """Whether it has not begun to release the robot."""
+        """True until the release begins."""
         return self.kind != "none" and self._time < self._release
 
     @property
     def rigid(self) -> bool:
-        """Whether nothing moves."""
+        """True while robot and object are held still."""
         return self.kind == "fixture" and self.waits
 
     def force(self, away: Array, velocity: Array) -> Array:
-        """Force on the hook, world frame, (3,) [N]; `away` from where it began (3,) [m], `velocity` (3,) [m/s]."""
+        """Force on the hook, world frame, (3,) [N]; `away`: its displacement (3,) [m]; `velocity` (3,) [m/s]."""
         release = max(LOWERING, self._release)
         times = (0.0, LOWERING, release, release + SLACKENING)
         if self.kind != "band" or self._time > times[-1]:

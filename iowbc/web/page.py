@@ -21,12 +21,12 @@ WASM = {
     "mujoco.wasm": "@mujoco/mujoco/mujoco.wasm",
     "onnxruntime.wasm": "onnxruntime-web/dist/ort-wasm-simd-threaded.wasm",
 }
-"""WebAssembly in the page's folder, and where npm puts it."""
+"""WebAssembly files of the page, and their paths in `node_modules`."""
 LIBRARY, PAGE = "iowbc.js", "page.js"
 BUNDLING = ("--bundle", "--format=esm", "--minify", "--target=es2022", "--external:module", "--log-level=warning")
 LAST_LINES = 6
 SCENES = "scenes.json"
-"""The page's addition to the exported files: scenes, and the names of the files that it has."""
+"""File that the page adds to the exported ones, with scenes, the first scene, and the name of the golden vectors."""
 
 
 def write_page(exported: Path, out: Path, cache: Path, say: Callable[[str], None]) -> None:
@@ -97,7 +97,7 @@ def require_node() -> None:
 def bundle(parts: Path, out: Path) -> None:
     """Write scripts, WebAssembly, HTML, style and licenses into a folder. Raises `UsageError`."""
     parts = parts.resolve()
-    with tempfile.TemporaryDirectory(dir=parts.parent) as build:  # imports are looked for beside and above the source
+    with tempfile.TemporaryDirectory(dir=parts.parent) as build:  # imports are resolved beside and above the source
         shutil.copytree(SOURCE, build, dirs_exist_ok=True)
         for name, others in ((LIBRARY, ()), (PAGE, (f"--external:./{LIBRARY}",))):
             words = ["node", str(parts / "esbuild/bin/esbuild"), name, *BUNDLING, *others]

@@ -23,7 +23,7 @@ from iowbc.sim.world import World
 from iowbc.task.specification import Specification
 
 KINDS = ("free", "lift")
-"""Scenes that the page simulates; the wheels of a crate, whose friction follows their direction, it does not."""
+"""Kinds of scenes that the page simulates; it lacks the direction-dependent friction of a crate's wheels."""
 FIELDS = (
     *("qpos0", "body_pos", "body_quat", "body_ipos", "body_iquat", "body_mass", "body_inertia", "jnt_pos", "jnt_axis"),
     *("jnt_range", "jnt_actfrcrange", "dof_armature", "dof_damping", "dof_frictionloss", "geom_pos", "geom_quat"),
@@ -32,10 +32,10 @@ FIELDS = (
 )
 """Arrays of the model that are written in full precision."""
 STILL = ("partner_share", "impulse_scale", "push_scale", "noise_scale")
-"""Quantities of an episode that are zero on the page: nobody helps or pushes, and sensors tell the truth."""
+"""Quantities of an episode that are zero on the page: no partner, no disturbances, no sensor noise."""
 ABOVE = 1e-6
-"""Height above the ground at which the robot begins [m]: which corners of soles touch that lie exactly on it is a
-matter of the last bit, and the browser's differs."""
+"""Initial height above the ground [m]. For soles exactly on the ground, contacts would depend on rounding, which
+differs in the browser."""
 HEAVIEST = 1.5
 """Mass to which the page's slider goes, as a part of the object's nominal one (Table I: to 150 %)."""
 
@@ -52,7 +52,7 @@ def first_scene(recipe: Recipe) -> str:
 
 
 def accepted(recipe: Recipe) -> list[tuple[str, float]]:
-    """Scenes and masses [kg] of objects in the hands with which the exported controller was tried."""
+    """Scenes and object masses [kg] of the acceptance trials that the page can show."""
     scenes = recipe.simulation.scenes
     trials = [(trial.scene, trial.mass) for trial in recipe.export.acceptance if trial.mass > 0.0]
     return [(name, mass) for name, mass in trials if _playable(getattr(scenes, name))]
@@ -70,7 +70,7 @@ def _web_scene(world: Specification, robot: Robot, name: str) -> dict[str, Any]:
     started, drawn = simulation.worlds[0], simulation.drawn
     layout, physics = started.layout, recipe.simulation.physics
     timing = Timing(simulation.period, physics.timestep, 0)
-    own = started.fields.of(0)  # after its start, for those that differ between simulations
+    own = started.fields.of(0)  # after the start, for fields that differ between simulations
     described = {
         "kind": scene.kind,
         "xml": _plain(scene_spec(robot, physics, scene, timing, dressed=False)),
@@ -150,7 +150,7 @@ def _plain(spec: Any) -> str:
 
 
 def _hold(world: World, robot: Robot, scene: Scene, inertia: Array, drawn: Mapping[str, float]) -> dict[str, Any]:
-    """Actions of the hands beside their connection to the object, or the contact with it."""
+    """Parameters of the grasp in addition to its connection or contact with the object."""
     grasp, layout, model = scene.grasp, world.layout, world.model
     compliant = grasp.kind == "compliant"
     places = np.arange(model.nsite)[layout.grips] if layout.palms is None else layout.palms

@@ -1,1 +1,1 @@
-"""Stages on Ray: the nodes compute, the driver alone stores and records."""
+"""Stages on Ray: nodes compute; only the driver writes to the store and to tracking."""

@@ -20,14 +20,14 @@ from iowbc.pipeline.store.digests import folder_digest
 ABORT_PATIENCE = 5.0
 """Seconds that Ray has to end a task that is aborted."""
 HEAD = "node:__internal_head__"
-"""Resource that Ray gives to the head node alone."""
+"""Ray resource that only the head node has."""
 
 
 class Cluster:
-    """The nodes of Ray. Runs stages there; several threads may ask for one each."""
+    """The nodes of a Ray cluster. Several threads may run a stage each."""
 
     def __init__(self, *, copy: bool) -> None:
-        """copy: nodes keep to their own disks."""
+        """copy: nodes use local copies of folders even where they see the driver's disk."""
         self.copy = copy
         self.aborted = False
         self._folders: dict[Path, SharedFolder] = {}
@@ -52,7 +52,8 @@ class Cluster:
         return f"Ray at {ray.get_runtime_context().gcs_address}: {nodes}, {self.cores} cores"
 
     def run(self, stage: Stage, job: Job) -> None:
-        """Run a stage on a node, as `stage.run(job)` would here. A lost node costs what it had not reported yet.
+        """Run a stage on a node, as `stage.run(job)` would here. If it is lost, retry from the last reported
+        checkpoint.
 
         Raises what the stage raises; RuntimeError with the node's traceback for an unexpected error.
         """
@@ -69,7 +70,7 @@ class Cluster:
         return NodeSpread({path: self._folder(path) for path in paths}, lambda: False, lambda text: None)
 
     def abort(self) -> None:
-        """End all that runs, at once."""
+        """Abort all running stages."""
         self.aborted = True
 
     def close(self) -> None:
@@ -80,7 +81,7 @@ class Cluster:
         """One attempt; the stage's output, as far as the node did not write it here. None where node or worker is
         lost."""
         task, workers = secrets.token_hex(8), min(job.workers, self.largest)
-        # One that only waits for its pieces must not keep them waiting.
+        # A stage that only waits for its pieces reserves no core, so that they can run.
         cores = 0 if stage.spreads(job.recipe) else workers
         scratch = (ray.put(files_of(job.work)),)
         marker(job.work, task).touch()
@@ -140,7 +141,7 @@ class Cluster:
 
 
 def _pass_on(job: Job, event: Event) -> None:
-    """Pass on what a task has reported."""
+    """Apply a task's event to the job."""
     kind, *rest = event
     if kind == "files":
         write_files(job.work, rest[0])

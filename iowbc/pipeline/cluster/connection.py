@@ -21,15 +21,15 @@ SETTINGS = {
     "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",
     "RAY_worker_niceness": "0",
 }
-"""Environment of Ray: it sends nothing to its makers, leaves accelerators' variables as they are, and its workers have
-the priority that those of a local run have."""
+"""Environment variables of Ray: no telemetry, accelerator variables unchanged, and workers with the priority of a local
+run's."""
 LOCAL = "local"
 """Address of a cluster of this machine alone, which listens on 127.0.0.1 and ends with this process."""
 ALONE = {"RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0", "RAY_AUTH_MODE": "token"}
-"""Environment in which Ray listens on 127.0.0.1 (on Linux it otherwise takes an address that others reach), to those
-alone who know a token."""
+"""Environment variables with which Ray listens on 127.0.0.1 only (by default, on Linux, on a reachable address) and
+requires a token."""
 OBJECT_STORE = 1 << 30
-"""Bytes of memory for objects in such a cluster; what is more goes to disk."""
+"""Object store of such a cluster [bytes]; the rest spills to disk."""
 STARTS = 4
 """Attempts to start it: on a busy machine Ray's own processes give each other up after 15 to 30 s."""
 
@@ -57,7 +57,7 @@ def connected(address: str, *, copy: bool) -> "Iterator[Cluster]":
 def _start() -> None:
     """Start a cluster of this machine alone, and connect to it. Raises `UsageError`."""
     os.environ.update(ALONE)
-    os.environ.setdefault("RAY_AUTH_TOKEN", secrets.token_hex(32))  # Ray reads a token once in a process
+    os.environ.setdefault("RAY_AUTH_TOKEN", secrets.token_hex(32))  # Ray reads the token once per process
     folder = tempfile.mkdtemp(prefix="iowbc-ray-")
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     settings = {"num_cpus": available_cores(), "object_store_memory": OBJECT_STORE, "include_dashboard": False}
@@ -72,7 +72,7 @@ def _connect(address: str, **settings: Any) -> None:
 
     try:
         ray.init(address=address, log_to_driver=False, logging_level="ERROR", **settings)
-    except Exception as error:  # Ray raises this and that
+    except Exception as error:  # Ray raises various types
         ray.shutdown()
         raise UsageError(
             f"--address {address}: {str(error).strip().splitlines()[0]}; valid: local (this machine alone), auto (the "

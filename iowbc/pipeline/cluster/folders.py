@@ -1,4 +1,4 @@
-"""Folders on their way between machines, as the bytes of their files under a digest."""
+"""Transfer of folders between machines, as file contents with a digest."""
 
 import os
 import shutil
@@ -27,12 +27,12 @@ class SharedFolder:
     path: str
     """Its place on the driver."""
     digest: str
-    """Of its files, names and contents."""
+    """Digest of file names and contents."""
     content: tuple[Any, ...]
-    """Ray's reference to its files; inside a tuple, so that a node fetches it only when it asks."""
+    """Ray's reference to its files; inside a tuple, so that Ray does not fetch it unless requested."""
     driver: Identity
     copy: bool
-    """True where a node reads a copy of its own although it may see the driver's folder."""
+    """True if a node uses a local copy even where it sees the driver's folder."""
 
 
 def files_of(folder: Path) -> dict[str, bytes]:
@@ -41,17 +41,17 @@ def files_of(folder: Path) -> dict[str, bytes]:
 
 
 def write_files(folder: Path, files: Files) -> None:
-    """Write files below a folder, each in place of what was there."""
+    """Write files below a folder, replacing existing ones."""
     for name, content in files.items():
         with replacing(folder / name) as fresh:
             fresh.write_bytes(content)
 
 
 def placed(folder: SharedFolder) -> Path:
-    """The folder on this machine: the driver's own, if this machine sees it; else a copy.
+    """Path of the folder on this machine: the driver's, if visible here, else a local copy.
 
-    The copy stays for later stages, under the folder's own name, which is the key of an artifact. Raises `StageFailed`
-    where this machine would give other results than the driver, `Damaged` where what arrives differs.
+    The copy is cached for later stages under the folder's own name, which is the key of an artifact. Raises
+    `StageFailed` if code or package versions differ from the driver's, `Damaged` if the transferred content differs.
     """
     if different := folder.driver.mismatch(identity()):
         raise StageFailed(f"a node is not as the driver: {different}; install the same on both")
@@ -59,7 +59,7 @@ def placed(folder: SharedFolder) -> Path:
     if not folder.copy and there.is_dir() and folder_digest(there) == folder.digest:
         return there
     own = _cache() / folder.digest / there.name
-    with named_lock(own.with_name("lock")):  # another task of this machine may fetch the same
+    with named_lock(own.with_name("lock")):  # another task on this machine may fetch the same folder
         if own.is_dir() and folder_digest(own) == folder.digest:
             return own
         shutil.rmtree(own, ignore_errors=True)
@@ -72,7 +72,7 @@ def placed(folder: SharedFolder) -> Path:
 
 
 def _cache() -> Path:
-    """Folder of this user's fetched copies. Raises `Damaged` where it belongs to somebody else."""
+    """This user's cache of fetched folders. Raises `Damaged` if it belongs to another user."""
     own = Path(tempfile.gettempdir(), f"iowbc-{os.getuid()}")
     own.mkdir(exist_ok=True, mode=0o700)
     if own.stat().st_uid != os.getuid():

@@ -17,9 +17,9 @@ from iowbc.pipeline.stage import Member
 
 Result = TypeVar("Result")
 TRIES = 5
-"""Retries in a row of a call, an actor or a stage whose node or worker is lost; after that it fails."""
+"""Consecutive retries of a call or an actor, and attempts at a stage, whose node or worker is lost; then it fails."""
 POLL = 0.2
-"""Seconds between two looks at what goes on."""
+"""Polling interval [s]."""
 
 
 def raised(error: Exception) -> BaseException | None:
@@ -36,7 +36,7 @@ class ActorHost:
         self._member: Member | None = None
 
     def ask(self, state: Any, message: Any, changes: bool) -> tuple[Any, Any]:
-        """The answer, and the state after it where it changes any. `state`: of a member that is not made yet."""
+        """The answer, and the new state if it changes. `state`: initial state of a member that is created now."""
         if self._member is None:
             self._member = self._make()
             if state is not None:
@@ -56,14 +56,14 @@ class Place:
     request: tuple[Any, bool] = (None, True)
     """The message, and whether it changes the state."""
     state: Any = None
-    """After the last request that changed it."""
+    """State after the last request that changed it."""
     answer: Any = None
     losses: int = 0
-    """In a row."""
+    """Consecutive losses of its actor."""
 
 
 class NodeActorPool:
-    """Members that are asked side by side. One that is lost is remade in the state after its last request."""
+    """Members that work in parallel. A lost one is recreated in its last known state, and its request is repeated."""
 
     def __init__(
         self,
@@ -97,8 +97,8 @@ class NodeActorPool:
     def answers(self) -> list[Any]:
         """The members' answers, in order.
 
-        Raises WorkerFailed with what a member raised, StageFailed where one is lost again and again, and `Interrupted`
-        where members have not begun yet when the job is asked to stop.
+        Raises `WorkerFailed` if a member raises, `StageFailed` if one is lost too often, and `Interrupted` if a stop is
+        requested while members have not started.
         """
         while self._asked:
             over, late = ray.wait(list(self._asked), num_returns=len(self._asked), timeout=POLL)
@@ -146,7 +146,7 @@ class NodeActorPool:
 
 
 class NodeSpread:
-    """The nodes of the cluster as a stage uses them."""
+    """A stage's access to the nodes of the cluster."""
 
     def __init__(
         self, folders: Mapping[Path, SharedFolder], interrupted: Callable[[], bool], say: Callable[[str], None]
@@ -162,10 +162,10 @@ class NodeSpread:
     def __call__(
         self, function: Callable[..., Result], calls: Sequence[tuple[Any, ...]], folders: Mapping[str, Path]
     ) -> Iterator[tuple[int, Result]]:
-        """Call a function of a module with each of these arguments, on any node, one core each; place and result of
-        each call, in the order in which they end. `folders`: what the job reads, passed by name as paths on the node.
+        """Call a module-level function with each of these arguments on any node, one core each. Yields index and result
+        of each call in the order of completion. `folders`: input folders, passed by name as paths on the node.
 
-        Raises `Interrupted` once the job is asked to stop.
+        Raises `Interrupted` once a stop is requested.
         """
         own = {name: self._folders[path] for name, path in folders.items()}
         piece = ray.remote(num_cpus=1, max_retries=TRIES, scheduling_strategy="SPREAD")(_called)

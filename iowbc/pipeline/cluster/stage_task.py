@@ -21,11 +21,11 @@ or `("shown", name)` of one of them for tracking."""
 REPORT_INTERVAL = 0.5
 """Seconds between two reports to the driver; the answer says whether to stop."""
 FILES_INTERVAL = 10.0
-"""Seconds between two looks for new checkpoints, which go to the driver where the node does not see its folder."""
+"""Seconds between two searches for new checkpoints, which are sent to a driver whose folder the node does not see."""
 
 
 class Mailbox:
-    """An actor beside the driver: events that tasks have reported, and tasks that are to stop."""
+    """Ray actor on the head node: events reported by tasks, and stop requests for them."""
 
     def __init__(self) -> None:
         self._events: dict[str, list[Event]] = {}
@@ -138,7 +138,7 @@ class NodeReport:
         return self._stop
 
     def flush(self, *, files: bool = False) -> None:
-        """Send all that was gathered, and, where asked for, new files of the scratch."""
+        """Send all buffered events, with `files` also new files of scratch."""
         if files:
             self._gather()
         self._reported = time.monotonic()
@@ -148,7 +148,7 @@ class NodeReport:
         self._answer = self._mailbox.report.remote(self._task, events)
 
     def end(self, *, files: bool = False) -> None:
-        """Send the rest, and return once all has arrived, which it does in order."""
+        """Send the rest and wait until all has arrived; events arrive in order."""
         self.flush(files=files)
         ray.get(self._answer)
 

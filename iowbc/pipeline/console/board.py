@@ -35,14 +35,14 @@ class Board:
     stopping: Callable[[], str] = lambda: ""
     """Text about a requested stop; empty before."""
     _over: list[StageView] = field(default_factory=list)
-    """In the order in which they have ended."""
+    """Ended runs, in order of their end."""
     _shown: float = field(default_factory=time.monotonic)
 
     def __post_init__(self) -> None:
         self.views = {name: StageView(name) for name in self.logs}
         live = self.console.is_terminal and not self.quiet
         self.live = Live(console=self.console, get_renderable=self._drawn, auto_refresh=False) if live else None
-        """The table, to be entered while the runs go on."""
+        """The live table; a context manager to hold during the runs."""
 
     def began(self, name: str) -> None:
         """A run begins."""
@@ -59,7 +59,7 @@ class Board:
         self._say(f"{name}: {state}{took}{f' - {note}' if note else ''} ({self._counts()})", lost=state == "failed")
 
     def refresh(self) -> None:
-        """Show how far the runs are, once in a while."""
+        """Show the runs' progress if the last display is older than the interval."""
         now = time.monotonic()
         if self.live is not None and now - self._shown > REDRAW:
             self._shown = now

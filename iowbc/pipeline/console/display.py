@@ -13,7 +13,7 @@ from iowbc.pipeline.console.wording import duration, pace
 RATE_WINDOW = 60.0
 """Seconds over which a stage's rate is averaged."""
 CURVE_POINTS = 200
-"""Points of the main metric that are remembered for its small curve."""
+"""Maximum number of points of a stage's sparkline."""
 
 
 @dataclass
@@ -30,7 +30,7 @@ class StageView:
     curve: list[tuple[float, float]] = field(default_factory=list)
     """Steps and values of the main metric."""
     began: float | None = None
-    """When it would have begun had it never been interrupted, on the monotonic clock [s]; None before it runs."""
+    """Start on the monotonic clock, shifted back by the time of earlier attempts [s]; None before it runs."""
     seconds: float | None = None
     """Time that it took in all [s]; None before it has ended."""
     _marks: deque[tuple[float, float]] = field(default_factory=deque)
@@ -46,8 +46,8 @@ class StageView:
             self._marks.popleft()
 
     def measured(self, metric: str, step: float, value: float) -> None:
-        """The main metric's value at a step. What an earlier attempt had from there on is dropped, and every second
-        value when there are many."""
+        """Add the main metric's value at a step. Values of an earlier attempt from this step on are dropped; a long
+        curve is thinned to every second value."""
         self.metric = self.metric or metric
         while self.curve and self.curve[-1][0] >= step:
             self.curve.pop()
@@ -69,7 +69,7 @@ class StageView:
 
     @property
     def rate(self) -> float | None:
-        """Units a second, lately."""
+        """Units per second over the last `RATE_WINDOW`."""
         if len(self._marks) < 2 or self._marks[-1][0] - self._marks[0][0] <= 0.0:
             return None
         return (self._marks[-1][1] - self._marks[0][1]) / (self._marks[-1][0] - self._marks[0][0])
@@ -102,7 +102,7 @@ class Display:
         """One line."""
 
     def end(self) -> None:
-        """Nothing more comes."""
+        """End the display."""
 
 
 class PlainDisplay(Display):
@@ -134,7 +134,7 @@ class PlainDisplay(Display):
         self.say("  ".join([*parts, view.note] if view.note else parts))
 
     def say(self, text: str) -> None:
-        """One line; a reader that has gone away (`| head`) does not stop the run."""
+        """Print one line; a closed pipe (`| head`) does not stop the run."""
         try:
             print(text, file=self.stream, flush=True)
         except BrokenPipeError:

@@ -18,7 +18,7 @@ CURVE_WIDTH = 24
 COLUMNS = {"stage": 10, "state": 7, "": 14, "done": 5, "spent": 11, "left": 11, "rate": 9}
 """Heads and widths of what is always shown: 74 characters with the spaces between them."""
 WITH_CURVES, WITH_NOTES = 100, 60
-"""Narrower terminals [characters] show no curves, and yet narrower ones no notes."""
+"""Minimum width of a terminal [characters] for curves, and for notes."""
 ECHO = 2
 """Characters that a terminal writes behind the last line where Ctrl-C is typed: `^C`."""
 REFRESH_RATE = 2.0

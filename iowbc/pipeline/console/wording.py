@@ -1,4 +1,4 @@
-"""Spans of time, numbers, sizes and lists of reasons in words for people."""
+"""Human-readable time spans, numbers, sizes and lists of reasons."""
 
 import time
 from collections.abc import Sequence

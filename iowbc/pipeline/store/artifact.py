@@ -23,7 +23,7 @@ MANIFEST = "manifest.json"
 INGREDIENTS = "key.json"
 RECIPE = "recipe.yaml"
 BESIDE = (INGREDIENTS, RECIPE)
-"""Files beside a stage's own."""
+"""Files that are added to a stage's own."""
 
 
 class FileRecord(BaseModel):
@@ -50,13 +50,13 @@ class Manifest(BaseModel):
     results: tuple[str, ...]
     """Those among them that decide later stages; the others are records: curves, times, pictures."""
     omitted: tuple[str, ...] = ()
-    """Those among them that a published copy leaves out, for their size or kind."""
+    """Files that a published copy leaves out because of size or type, or on request."""
     beside: dict[str, FileRecord]
     """The key's ingredients, and the recipe."""
     recipe: str
     """Name of the recipe that made it."""
     made: float
-    """When it was finished [s since 1970]."""
+    """Time of completion [s since 1970]."""
     seconds: float
     """Time that the stage took, over all attempts [s]."""
     attempts: int
@@ -149,10 +149,10 @@ class Artifact:
 def seal(
     out: Path, results: Sequence[str], details: Mapping[str, Any], ingredients: Mapping[str, Any], recipe: str
 ) -> None:
-    """Turn a stage's output into an artifact: records beside it, everything on disk, the manifest last.
+    """Turn a stage's output into an artifact: add key and recipe, sync all files, write the manifest last.
 
-    results: patterns of the files that decide later stages; each must fit one. details: the fields of `Manifest` that
-    do not follow from the files.
+    results: patterns of the files that later stages depend on; each must match a file. details: the fields of
+    `Manifest` that are not computed from the files.
     """
     files = {
         path.relative_to(out).as_posix(): _record(path)
@@ -179,12 +179,12 @@ def seal(
 
 
 def write_manifest(folder: Path, manifest: Manifest) -> None:
-    """Write a manifest, sealed, as the last of a folder's files."""
+    """Seal and write a manifest; call it after all other files are written."""
     write_whole(folder / MANIFEST, manifest.sealed().model_dump_json(indent=1))
 
 
 def read_artifact(folder: Path, stage: str, key: str, *, published: bool = False) -> Artifact:
-    """The artifact in a folder. Raises `Damaged` where its manifest is not what was written."""
+    """The artifact in a folder. Raises `Damaged` if its manifest is missing, altered, or of another artifact."""
     if not (folder / MANIFEST).is_file():
         raise Damaged(f"{MANIFEST} is missing")
     found = read_json(folder / MANIFEST)

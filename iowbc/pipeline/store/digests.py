@@ -15,7 +15,7 @@ PACKAGE = Path(__file__).parents[2]
 
 
 def canonical_json(data: Any) -> str:
-    """The one way to write this data as JSON: sorted keys, no spaces, no NaN."""
+    """Canonical JSON of the data: sorted keys, no spaces, no NaN."""
     return json.dumps(data, sort_keys=True, separators=(",", ":"), ensure_ascii=True, allow_nan=False)
 
 

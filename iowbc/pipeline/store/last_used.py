@@ -1,6 +1,6 @@
-"""Artifacts that each recipe used last, for `status` and `show`, and ever, which `gc` spares, and links to them.
+"""Records of artifacts that each recipe used last (for `status`, `show`) and ever (kept by `gc`), and links.
 
-A link is named `runs/<recipe>/<stage>` for what a recipe has, `<stage>-<key>` for what a run with overrides made.
+A link is named `runs/<recipe>/<stage>`; for a run with overrides, `runs/<recipe>/<stage>-<key>`.
 """
 
 import os
@@ -43,7 +43,7 @@ class LastUsed(BaseModel):
 def remember(runs: Runs, loaded: LoadedRecipe, artifact: Artifact) -> None:
     """Record that a recipe's stage uses this artifact.
 
-    What a recipe has without overrides is what its name stands for: a run with some only adds to what was ever used.
+    A recipe's name stands for its artifacts without overrides, so a run with overrides only adds to `ever`.
     """
     stage, key, name = artifact.manifest.stage, artifact.manifest.key, loaded.recipe.name
     record = _record(runs, name) or LastUsed()
@@ -100,7 +100,7 @@ def named_folder(runs: Runs, recipe: str, stage: str, artifact: Path) -> Path:
 
 
 def remove_dangling(runs: Runs) -> None:
-    """Remove the links whose artifacts are gone."""
+    """Remove links to deleted artifacts."""
     for folder in runs.root.iterdir() if runs.root.is_dir() else ():
         if folder.is_dir() and folder not in runs.parts and _only_links(folder):
             for path in folder.iterdir():
@@ -131,7 +131,7 @@ def _only_links(folder: Path) -> bool:
 
 
 def _record(runs: Runs, recipe: str) -> LastUsed | None:
-    """A record that is whole, or None."""
+    """A readable record, or None."""
     try:
         record = LastUsed.model_validate_json(record_path(runs, recipe).read_bytes())
     except (OSError, ValueError):

@@ -1,4 +1,4 @@
-"""One process a key: a lock that the system releases when its holder dies."""
+"""File locks, one per key, which the system releases when the holder dies."""
 
 import fcntl
 import os
@@ -17,14 +17,14 @@ POLL = 0.2
 
 
 class Holder(BaseModel):
-    """Holder of a lock; of one whose file is being written, or was overwritten, nothing is known."""
+    """Holder of a lock; its fields have defaults if the lock file is being written or unreadable."""
 
     model_config = ConfigDict(frozen=True)
 
     pid: int = 0
     host: str = "?"
     since: float = Field(default_factory=time.time)
-    """When the lock was taken [s since 1970]."""
+    """Time of acquisition [s since 1970]."""
 
     def __str__(self) -> str:
         return f"process {self.pid} on {self.host} since {time.strftime('%H:%M:%S', time.localtime(self.since))}"
@@ -52,9 +52,9 @@ def holder(runs: Runs, key: str) -> Holder | None:
 def key_lock(
     runs: Runs, key: str, on_wait: Callable[[Holder], None], interrupted: Callable[[], bool]
 ) -> Iterator[bool]:
-    """Hold a key's lock, waiting for another holder after `on_wait` received who it is.
+    """Hold a key's lock. If another process holds it, call `on_wait` with that holder, then wait.
 
-    Yields False, without the lock, when `interrupted` turned true while waiting.
+    Yields False, without the lock, if `interrupted` becomes true while waiting.
     """
     runs.locks.mkdir(parents=True, exist_ok=True)
     with lock_path(runs, key).open("a+") as file:

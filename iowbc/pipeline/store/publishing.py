@@ -1,4 +1,4 @@
-"""Artifacts that go into the repository: `runs/published/`, a copy of what the store has, of safe and small files."""
+"""Published artifacts: copies in `runs/published/`, for the repository, of small files of safe types."""
 
 import shutil
 from collections.abc import Collection
@@ -11,15 +11,15 @@ from iowbc.pipeline.store.locks import lock_path, named_lock
 from iowbc.pipeline.store.runs import Runs
 
 PUBLISHING = "publish"
-"""Lock of whoever publishes."""
+"""Name of the lock of publishing."""
 KINDS = frozenset(
     [".safetensors", ".json", ".jsonl", ".npz", ".parquet", ".onnx", ".csv", ".md", ".tex", ".png", ".xml", ".yaml"]
 )
 """Endings of files that are published: reading them executes no code."""
 LARGEST_FILE = 12_000_000
-"""A larger file is left out [bytes]: the stages behind it need its digest alone. What a training goes on from fits."""
+"""Maximum size of a published file [bytes]; later stages need only a larger one's digest. Training states fit."""
 LARGEST_REPOSITORY = 60_000_000
-"""All that may be published [bytes]: a clone must stay quick."""
+"""Maximum size of all published files [bytes], so that cloning stays fast."""
 
 
 def publish(runs: Runs, artifact: Artifact, without: Collection[str] = ()) -> Artifact:
@@ -52,7 +52,7 @@ def publish(runs: Runs, artifact: Artifact, without: Collection[str] = ()) -> Ar
 
 
 def published_size(runs: Runs) -> int:
-    """Bytes of all that is published. Raises `UsageError` where that is more than a repository should carry."""
+    """Size of all published files [bytes]. Raises `UsageError` above `LARGEST_REPOSITORY`."""
     size = sum(path.stat().st_size for path in runs.published.rglob("*") if path.is_file())
     if size > LARGEST_REPOSITORY:
         raise UsageError(

@@ -1,4 +1,4 @@
-"""Folders of everything that runs leave behind, and checks before work begins that they can be written."""
+"""The folder tree of all runs, and checks that it can be written before work begins."""
 
 import json
 import os
@@ -29,7 +29,7 @@ class Runs:
         self.recipes = root / "recipes"
         """Artifacts that each recipe used last, `<name>.json`."""
         self.tracking = root / "tracking"
-        """Journals of what MLflow is to record, until it has taken it."""
+        """Journals of tracking data until MLflow has received them."""
         self.sweeps = root / "sweeps"
         """Points and results of each sweep, `<name>/`."""
         self.compared = root / "compare"
@@ -80,8 +80,7 @@ def require_writable(folder: Path, option: str) -> None:
 
 
 def _remedy(folder: Path, option: str) -> str:
-    """Remedy for a folder that cannot be written: another user's runs are to be given to this one; any other
-    folder is left to its owner."""
+    """Advice for a folder that cannot be written: chown for another user's runs, else another folder."""
     there = next((path for path in (folder, *folder.parents) if path.exists()), folder)
     owner, user = there.stat().st_uid, os.geteuid()
     if option != "--runs" or owner == user or there != folder or not folder.is_dir():
@@ -93,7 +92,7 @@ def _remedy(folder: Path, option: str) -> str:
 
 
 def obstacle(folder: Path) -> str:
-    """The reason why no file can be made in a folder, which is made where it is missing; empty where one can."""
+    """The reason why files cannot be created in a folder, empty if they can; creates the folder if it is missing."""
     if folder.exists() and not folder.is_dir():
         return "it is not a folder"
     try:

@@ -18,17 +18,17 @@ class Store:
         self.runs = runs
 
     def folder(self, stage: str, key: str) -> Path:
-        """Folder of the artifact of a stage and key, whether or not it is there."""
+        """Folder of an artifact, which need not exist."""
         return self.runs.store / stage / key
 
     def find(self, stage: str, key: str, *, published: bool = False) -> Artifact | None:
-        """The artifact that was made here, or the published one, or None. Raises `Damaged` where its manifest is not
-        what was written."""
+        """The artifact in the store, or with `published` the published one; None if there is none. Raises `Damaged` if
+        its manifest is damaged."""
         folder = (self.runs.published if published else self.runs.store) / stage / key
         return read_artifact(folder, stage, key, published=published) if folder.is_dir() else None
 
     def checked(self, stage: str, key: str, *, published: bool = False) -> tuple[Artifact | None, str]:
-        """The artifact that `find` finds and whose files are what was written, or what is wrong with it."""
+        """The artifact of `find` after verification of its files, or None with the damage."""
         try:
             if (artifact := self.find(stage, key, published=published)) is not None:
                 artifact.verify()
@@ -37,7 +37,7 @@ class Store:
         return artifact, ""
 
     def find_any(self, stage: str, key: str) -> Artifact | None:
-        """The artifact that was made here, else the published one; None where there is none with a whole manifest."""
+        """The artifact in the store, else the published one; None if neither has an undamaged manifest."""
         for published in (False, True):
             with suppress(Damaged):
                 if (artifact := self.find(stage, key, published=published)) is not None:
@@ -45,7 +45,8 @@ class Store:
         return None
 
     def artifacts(self, stage: str | None = None) -> list[Artifact]:
-        """All readable artifacts, of one stage or of all, oldest first; of two with one key the one made here."""
+        """All readable artifacts, of one stage or all, oldest first; local ones replace published ones of the same
+        key."""
         found: dict[str, Artifact] = {}
         for root in (self.runs.store, self.runs.published):
             for folder in root.glob(f"{stage or '*'}/*"):
@@ -55,7 +56,7 @@ class Store:
         return sorted(found.values(), key=lambda artifact: artifact.manifest.made)
 
     def add(self, out: Path, stage: str, key: str) -> Artifact:
-        """Move sealed output into the store, in place of an artifact that stands there already."""
+        """Move sealed output into the store, replacing an existing artifact."""
         folder = self.folder(stage, key)
         folder.parent.mkdir(parents=True, exist_ok=True)
         replace_folder(out, folder)

@@ -17,7 +17,7 @@ from iowbc.pipeline.store.runs import Runs
 
 PROGRESS = "progress.json"
 Number = Annotated[float, Field(strict=True, gt=-1e18, lt=1e18)]
-"""Steps or seconds, of which there are not so many."""
+"""Steps or seconds; the bounds reject damaged values."""
 WRITE_INTERVAL = 1.0
 """Seconds between two records of the progress on disk."""
 
@@ -66,7 +66,7 @@ class Workspace:
         self.scratch = self.root / "scratch"
         self.out = self.root / "out"
         self.state = Progress(stage=stage, key=key)
-        """Of the present attempt."""
+        """Record of the current attempt."""
         self._begun = self._written = 0.0
 
     def begin(self, recipe: str, forced: bool, code: dict[str, str], command: str = "") -> Progress | None:
@@ -89,7 +89,7 @@ class Workspace:
         return earlier
 
     def describe(self, ingredients: Mapping[str, Any], recipe: str) -> None:
-        """Write what the key was computed from, and the recipe, as the artifact will have them beside it."""
+        """Write the ingredients of the key and the recipe, as they will be in the artifact."""
         write_whole(self.root / INGREDIENTS, json.dumps(ingredients, indent=1, sort_keys=True))
         write_whole(self.root / RECIPE, recipe)
 
@@ -99,13 +99,13 @@ class Workspace:
         return self.state.before + time.monotonic() - self._begun
 
     def progress(self, done: float, total: float, note: str) -> None:
-        """Record how far the stage is, at most once in a while."""
+        """Update the progress; written to disk at most once per `WRITE_INTERVAL`."""
         self.state.done, self.state.total, self.state.note = done, total, note
         if time.monotonic() - self._written > WRITE_INTERVAL:
             self.write()
 
     def drawn(self, metric: str, curve: Sequence[tuple[float, float]]) -> None:
-        """Keep the stage's small curve of steps and values for the next record: a resumed run goes on with it."""
+        """Set the metric's curve for the next write; a resumed run continues it."""
         self.state.metric, self.state.curve = metric, list(curve)
 
     def write(self) -> None:
@@ -116,7 +116,7 @@ class Workspace:
 
     @property
     def leftover(self) -> bool:
-        """True where the output has gone to the store and the rest stayed."""
+        """True if the output was moved to the store but the folder was not removed."""
         return self.root.is_dir() and not self.out.is_dir()
 
     def remove(self) -> None:

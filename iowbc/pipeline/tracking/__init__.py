@@ -1,4 +1,4 @@
-"""Records of runs for MLflow, by way of a journal on disk: a run never waits for MLflow, and nothing is lost.
+"""Tracking in MLflow through a journal on disk, so that a run never waits for MLflow and no data are lost.
 
-MLflow's own asynchronous logging keeps what was not sent in memory, where it ends with the process.
+MLflow's own asynchronous logging keeps unsent data in memory and loses them when the process ends.
 """

@@ -1,8 +1,8 @@
-"""Journals on their way to MLflow: each event at least once, and to no other effect when it comes twice.
+"""Delivery of journals to MLflow: each event at least once; repeated delivery has no further effect.
 
-A line that is damaged is put aside in `runs/damaged/` and named; the others go on. One process at a time sends the
-journals of a `runs/` folder: `python -m iowbc.pipeline.tracking.delivery RUNS`. It stays as long as a journal's process
-lives, ends the runs of processes that died as KILLED, and leaves what a server does not take for the next one.
+A damaged line is set aside in `runs/damaged/` and logged; the others are sent. One sender process at a time serves a
+`runs/` folder: `python -m iowbc.pipeline.tracking.delivery RUNS`. It runs while any journal's process is alive, ends
+the runs of dead processes as KILLED, and leaves unsent data to the next sender.
 """
 
 import itertools
@@ -24,30 +24,30 @@ if TYPE_CHECKING:
     from mlflow.tracking import MlflowClient
 
 DAMAGED_LINE = "journal-"
-"""Beginning of the name of a file with a line that was put aside."""
+"""Prefix of the file of a damaged line."""
 URI_VARIABLE = "MLFLOW_TRACKING_URI"
 MAXIMUM_TEXT = 5000
 """Longest value of a parameter or tag that MLflow's stores take [characters]."""
 ORIGIN_TAG = "iowbc.origin"
 """Tag with a run's journal and its name there, by which a sender finds what another one made before it died."""
 POLL = 0.5
-"""Seconds between two looks at the journals of living processes."""
+"""Polling interval of the journals of live processes [s]."""
 RETRIES, RETRY_WAIT = 3, 2.0
-"""Attempts at a server that does not answer, after the last living process has gone, and seconds between them."""
+"""Failed attempts in sequence before giving up, if no journal's process is alive, and wait between them [s]."""
 SERVED = "mlflow-artifacts:/"
-"""Artifact location of the embedded database for MLflow: wherever its server keeps files, so that `runs` may move."""
+"""Artifact location in the embedded database, relative to MLflow's server, so that `runs` can be moved."""
 REFUSALS = ("INVALID_PARAMETER_VALUE", "BAD_REQUEST", "RESOURCE_DOES_NOT_EXIST", "RESOURCE_ALREADY_EXISTS")
-"""Answers that another attempt would not change; what was refused is left out."""
+"""Error codes that a retry would not change; the refused event is skipped."""
 
 
 class Delivery:
-    """Sends one journal. Reads each line once, however long the run is."""
+    """Sender of one journal, which reads each line once."""
 
     def __init__(self, runs: Runs, path: Path) -> None:
         self.runs, self.path = runs, path
         self.offset = sent(path)
         self._ids: dict[str, str] = {}
-        """MLflow's identifiers of the journal's runs, as far as this sender has asked for them."""
+        """MLflow's identifiers of the journal's runs that this sender has looked up."""
         self._checked = -1
         """Size of the journal when its process was found dead and its runs were ended."""
         self._finished = False
@@ -67,7 +67,7 @@ class Delivery:
         return False
 
     def advance(self) -> bool:
-        """Send what is new, and remove the journal once its run has finished; False where MLflow was not reached."""
+        """Send new events, and remove the journal once its run has finished; False after an error."""
         try:
             if self.offset < self.path.stat().st_size:
                 self._connect()
@@ -143,7 +143,7 @@ class Delivery:
             print(f"{self.path.name}: MLflow refused '{kind}' of {event['id']}: {error.message}", flush=True)
 
     def _run_of(self, event: Mapping[str, Any]) -> str:
-        """MLflow's identifier of an event's run, which is made where MLflow has none yet, with what is known of it."""
+        """MLflow's identifier of an event's run; the run is created if MLflow has none yet."""
         name = event["id"]
         if name not in self._ids:
             unknown = {"parent": None if name == PARENT else PARENT, "name": name, "tags": {}, "params": {}}
@@ -158,7 +158,7 @@ class Delivery:
         return self._ids[name]
 
     def _found_or_made(self, identifier: str, name: str, moment: int) -> str:
-        """The run that MLflow has of an identifier in this journal, or of `JOURNAL/IDENTIFIER`, else a new one."""
+        """MLflow's run for an identifier in this journal, or for `JOURNAL/IDENTIFIER`; created if there is none."""
         origin = identifier if "/" in identifier else f"{self.path.stem}/{identifier}"
         condition = f"tags.`{ORIGIN_TAG}` = '{origin}'"
         found = self.client.search_runs([self._experiment], condition, max_results=1)
@@ -187,7 +187,7 @@ class Delivery:
         self.client.log_batch(run, metrics=metrics)
 
     def _files(self, run: str, names: Sequence[str]) -> None:
-        """Files and folders below `runs`; those of the embedded database go where MLflow's server looks for them."""
+        """Send files and folders below `runs`; for the embedded database copy them to MLflow's artifact folder."""
         folder = self.runs.tracked_files / run / "artifacts"
         for path in (self.runs.root / name for name in names):
             if path.exists() and not self._embedded:
@@ -205,7 +205,7 @@ def tracking_uri() -> str:
 
 
 def setup_lock(runs: Runs) -> AbstractContextManager[None]:
-    """Held while a process sets up the database or an experiment: MLflow's own set-up is not safe for two."""
+    """Lock for setting up the database or an experiment, which MLflow does not protect against concurrency."""
     return named_lock(runs.tracking / "setup.lock")
 
 
@@ -217,7 +217,7 @@ def client(uri: str) -> "MlflowClient":
 
 
 def experiment(client: "MlflowClient", name: str, runs: Runs) -> str:
-    """Identifier of an experiment, which is made where it is missing; files of any database file lie under `runs/`."""
+    """Identifier of an experiment, created if missing; files of an SQLite store lie under `runs/`."""
     found = client.get_experiment_by_name(name)
     if found is not None:
         return str(found.experiment_id)

@@ -1,9 +1,9 @@
-"""The journal of a run: all that MLflow is to know, as lines of JSON on disk before anything is sent.
+"""The journal of a run: all tracking data as lines of JSON, on disk before they are sent to MLflow.
 
-The first line says where it goes. Each further line is one event: `run` (a run begins, `parent` for a nested one),
-`reopen`, `tags`, `metrics`, `files` or `end`, and ends with a checksum: a line that differs from it is passed over.
-While its process lives, the journal is locked; a journal that is not locked and has runs without an end belonged to a
-process that died.
+The first line names the destination. Each further line is one event: `run` (a run begins, `parent` for a nested one),
+`reopen`, `tags`, `metrics`, `files` or `end`. Every line ends with a checksum; a line that does not match it is
+skipped. The journal is locked while its process is alive: an unlocked journal with unfinished runs belongs to a dead
+process.
 """
 
 import contextlib
@@ -28,7 +28,7 @@ CHECKSUM = re.compile(rb'(.*), "check": "([0-9a-f]{8})"}\n', re.DOTALL)
 
 
 class Journal:
-    """A journal that this process writes, alone."""
+    """A journal open for writing by this process only."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -133,7 +133,7 @@ def close_orphaned(path: Path) -> bool:
 
 
 def sent_path(path: Path) -> Path:
-    """File beside a journal that says how far it has been sent."""
+    """File beside a journal with the number of bytes sent."""
     return path.with_suffix(".sent")
 
 
@@ -152,7 +152,7 @@ def mark_sent(path: Path, offset: int) -> None:
 
 
 def unsent(path: Path) -> bool:
-    """True while MLflow lacks something of a journal; a sender may remove it at any moment, once it has all."""
+    """True while part of a journal is unsent; a sender may remove a fully sent journal at any time."""
     return sent(path) < _size(path)
 
 

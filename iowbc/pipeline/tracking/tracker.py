@@ -25,7 +25,7 @@ from iowbc.recipe.sweep import Sweep
 SHOWN_FOLDERS = ("figures", "tables", "videos")
 """Folders of an artifact that go to MLflow."""
 CHECKING_TIME = 1.0
-"""Seconds within which a sender that looks at a journal has let go of it again."""
+"""Time limit for acquiring a journal's lock, which a sender holds briefly [s]."""
 DESCRIPTION = "mlflow.note.content"
 """Tag that MLflow shows as a run's description."""
 
@@ -52,7 +52,7 @@ class RunRecord:
     def send(self) -> None:
         """Start a sender where none is at work."""
         if self._process is None or self._process.poll() is not None:
-            with contextlib.suppress(OSError):  # without a sender the journal waits for that of the next run
+            with contextlib.suppress(OSError):  # the next run's sender will send the journal
                 self._process = start_sender(self.runs)
 
     def describe(self, text: str, figures: Mapping[str, float] | None = None, files: Sequence[Path] = ()) -> None:
@@ -79,7 +79,7 @@ class RunRecord:
         if self._open is None:
             return True
         path = self._open.path
-        with contextlib.suppress(OSError):  # the run has ended as it did, whether or not that can be written
+        with contextlib.suppress(OSError):  # a full disk must not change how the run ends
             self._open.write("end", id=PARENT, status=status)
         self._open.close()
         self.send()
@@ -99,18 +99,18 @@ class Tracker(RunRecord):
     """Records one recipe run and its stages. A run of the same recipe that did not finish is continued."""
 
     def __init__(self, runs: Runs, loaded: LoadedRecipe, within: str | None = None) -> None:
-        """within: the run of another journal above this one, which sees to the sender, too."""
+        """within: parent run in another journal, whose process also starts the sender."""
         self.within = within
         self._recipe = loaded.recipe
         self._resolved = loaded.recipe.model_dump(mode="json")
         self._cached: list[tuple[str, Artifact]] = []
-        """Cached stages of a run that has made nothing yet: it is recorded once it makes something."""
+        """Cached stages of a run without a journal: a run is recorded only once a stage of it runs."""
         journal = unfinished_journal(runs, self._recipe.name, data_digest(self._resolved))
         super().__init__(runs, journal, loaded.recipe.execution.tracking_patience)
 
     @property
     def _journal(self) -> Journal:
-        """The journal, which begins when it is first needed."""
+        """The journal, created on first access."""
         if self._open is None:
             name, experiment = self._recipe.name, self._recipe.execution.experiment
             params, digest = parameters(self._resolved), data_digest(self._resolved)
@@ -162,7 +162,7 @@ class Tracker(RunRecord):
 def new_journal(
     runs: Runs, name: str, experiment: str, digest: str, params: Mapping[str, str], within: str | None = None
 ) -> Journal:
-    """A journal whose run begins; `digest` is of what the run does. within: see `Tracker`."""
+    """Create a journal and start its run; `digest` identifies the work of the run. within: see `Tracker`."""
     stamp = time.strftime("%Y%m%d-%H%M%S")
     journal = Journal(runs.tracking / f"{stamp}-{name}-{os.getpid()}.jsonl")
     journal.acquire(CHECKING_TIME)
@@ -172,7 +172,7 @@ def new_journal(
 
 
 def unfinished_journal(runs: Runs, name: str, digest: str) -> Journal | None:
-    """The newest journal of the same run, where that did not finish and its process is gone; the run goes on."""
+    """The newest journal of the same run if it is unfinished and its process is dead; reopened to continue."""
     for path in sorted(runs.tracking.glob(f"*-{name}-*.jsonl"), reverse=True):
         first = header(path)
         if first.get("digest") != digest or first.get("uri") != tracking_uri():
@@ -189,7 +189,7 @@ def unfinished_journal(runs: Runs, name: str, digest: str) -> Journal | None:
 
 
 def sweep_record(runs: Runs, sweep: Sweep, execution: Execution) -> RunRecord:
-    """The run above those of a sweep's points, which record themselves; one that did not finish is continued."""
+    """The parent run of a sweep, whose points record themselves; an unfinished one is continued."""
     digest = data_digest({"sweep": sweep.name, "points": {one.name: dict(one.settings) for one in sweep.points}})
     axes = {path: dict.fromkeys(str(one.settings[path]) for one in sweep.points) for path in sweep.axes}
     params = {"sweep": sweep.name, "points": str(len(sweep.points))}
@@ -237,7 +237,7 @@ def _log(runs: Runs) -> BinaryIO:
 
 
 def backlog(runs: Runs) -> list[Path]:
-    """Journals that MLflow does not have whole."""
+    """Journals with unsent data."""
     return [path for path in sorted(runs.tracking.glob("*.jsonl")) if unsent(path)]
 
 

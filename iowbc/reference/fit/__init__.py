@@ -1,1 +1,1 @@
-"""Fits the reference generator to its labels, and judges it."""
+"""Fit of the reference generator to its labels, and its evaluation."""

@@ -1,4 +1,4 @@
-"""Fits the reference network in torch: joint errors, and what they do to feet, height and torso to first order."""
+"""Fit of the reference network in torch: joint errors, and their first-order effect on feet, height and torso."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -14,9 +14,9 @@ from iowbc.recipe.generator import Fit
 from iowbc.reference.fit.task_error import LENGTH_ROWS, ROWS
 
 SMALLEST_SPREAD = 1e-3
-"""Least standard deviation by which an input or output is divided: a constant stays constant."""
+"""Least standard deviation used for normalisation: a constant stays constant."""
 FINAL_RATE = 0.01
-"""Last learning rate over the first."""
+"""Final learning rate as a fraction of the initial one."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class FitData:
 
 @dataclass(frozen=True)
 class Fitted:
-    """The network's numbers, float32."""
+    """Weights, normalisation and losses of the fitted network, float32."""
 
     layers: tuple[tuple[Array, Array], ...]
     input_mean: Array
@@ -64,7 +64,7 @@ def fit(
     epoch_done: Callable[[int, float, float], None],
     interrupted: Callable[[], bool],
 ) -> Fitted:
-    """Trains with Adam on |δθ|² + w |J δθ|², lengths in units of `length_scale`; keeps the best validated epoch.
+    """Trains with Adam on |δθ|² + w |J δθ|², lengths in units of `length_scale`; keeps the epoch that validates best.
 
     One thread and one seeded generator: the result is the same on every run.
     """

@@ -51,13 +51,13 @@ class Verdict:
     """Value, limit and result of each gate."""
     failures: list[str]
     worst: list[str]
-    """The worst held-out samples in words."""
+    """Descriptions of the worst held-out samples."""
 
 
 def judge_fit(
     gates: FitGates, dataset: Dataset, held: Indices, predicted: Array, errors: TaskErrors, jumps: Array
 ) -> Verdict:
-    """Compares predictions (n, 15) for the dataset's rows `held` with labels and commands; `jumps`: see above."""
+    """Compares predictions (n, 15) for the dataset's rows `held` with labels and commands; `jumps` (lines,) [rad]."""
     difference = predicted - dataset.support[held]
     per_sample = np.sqrt((difference**2).mean(axis=1))
     metrics = {

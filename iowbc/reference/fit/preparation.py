@@ -1,4 +1,4 @@
-"""From the dataset to what the fit needs: task Jacobians, splits by group, mirror images."""
+"""Preparation of the dataset for the fit: task Jacobians, splits by group, mirror images."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ class Prepared:
     train: FitData
     validation: FitData
     training: Indices
-    """Rows of the dataset that are trained on."""
+    """Rows of the dataset for training, without mirror images."""
     held_out: Indices
     """Rows of the dataset kept for the gates."""
     samples: list[Sample]

@@ -1,4 +1,4 @@
-"""Labels held against each other: static ones against optimal control, mirrored samples against their originals."""
+"""Comparisons of labels: static ones with optimal control, mirrored samples with their originals."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Labelled samples of a run, as one file: `dataset.npz`."""
+"""Dataset of labelled samples, as one file: `dataset.npz`."""
 
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -15,7 +15,7 @@ class Dataset:
     """Kept samples with their labels (leading dimension n), and rejected samples with their reasons (r)."""
 
     index: Array
-    """Number of the sample, shape (n,)."""
+    """Sample numbers, shape (n,)."""
     group: Array
     """Mirror images share a group, shape (n,)."""
     arm: Array
@@ -25,11 +25,11 @@ class Dataset:
     support: Array
     """The labels: support postures, shape (n, 15) [rad]."""
     base_position: Array
-    """Base over the middle of the soles, shape (n, 3) [m]."""
+    """Base position from the middle of the soles, shape (n, 3) [m]."""
     base_quaternion: Array
     """Base orientation, wxyz, shape (n, 4)."""
     wrench: Array
-    """Ground on each sole, in the sole's frame, force and moment, shape (n, 2, 6) [N, N·m]."""
+    """Wrench of the ground on each sole in the sole's frame, force then moment, shape (n, 2, 6) [N, N·m]."""
     torque: Array
     """Torques of the support joints, shape (n, 15) [N·m]."""
     margin: Array
@@ -40,9 +40,9 @@ class Dataset:
     rejected_command: Array
     """Samples without a label, shapes (r, 14), (r, 2)."""
     rejected_index: Array
-    """Their numbers, shape (r,)."""
+    """Sample numbers of the rejected samples, shape (r,)."""
     rejected_reason: Array
-    """Why, shape (r,), text."""
+    """Reasons for rejection, shape (r,), text."""
 
     def __len__(self) -> int:
         return len(self.index)
@@ -52,7 +52,7 @@ class Dataset:
 
     @classmethod
     def load(cls, path: Path) -> "Dataset":
-        """Reads the archive. Raises ValueError where arrays are missing or not finite."""
+        """Reads the archive. Raises ValueError for missing arrays or values that are not finite."""
         with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
             missing = [f.name for f in fields(cls) if f.name not in stored.files]
             if missing:

@@ -1,4 +1,4 @@
-"""The physical gates of a label, judged on the whole robot and independent of the method that made it."""
+"""Physical gates of a label, checked on the whole robot and independent of the labelling method."""
 
 from dataclasses import dataclass
 from itertools import combinations
@@ -44,7 +44,7 @@ class LabelJudge:
         self.effort = support.problem.effort_fraction * robot.effort
 
     def arms(self, sample: Sample) -> None:
-        """Rejects arms that collide with each other or the trunk, before anything is solved; legs at their default."""
+        """Rejects arms that collide with each other or the trunk, with the legs at their default, before solving."""
         support = self.support
         q = support.whole(support.start(), sample.arm)
         pinocchio.forwardKinematics(support.full, support.full_data, q)
@@ -87,8 +87,8 @@ class LabelJudge:
 
 
 class SelfCollision:
-    """Distances between all pairs of capsules that are neither fixed to each other, nor a joint apart, nor excluded by
-    the MJCF."""
+    """Distances between capsules, except on bodies that are fixed to each other, one joint apart, or excluded by the
+    MJCF."""
 
     def __init__(self, robot: Robot, model: Any) -> None:
         self._model, self._geometry = model, pinocchio.GeometryModel()
@@ -118,7 +118,7 @@ class SelfCollision:
 
 
 def _placed(capsule: Capsule) -> tuple[Any, Any]:
-    """Place in the body's frame and shape of a capsule; coal's lies along z, about its middle."""
+    """Pose in the body's frame and shape of a capsule; coal's lies along z, about its middle."""
     middle, along = 0.5 * (capsule.start + capsule.end), capsule.end - capsule.start
     length = float(np.linalg.norm(along))
     if length == 0.0:
@@ -128,7 +128,7 @@ def _placed(capsule: Capsule) -> tuple[Any, Any]:
 
 
 def _may_touch(robot: Robot, a: str, b: str) -> bool:
-    """True for two bodies that are checked for collision; what is fixed to a body is as near to others as that one."""
+    """True for two bodies that are checked for collision; bodies fixed to each other count as one."""
     tree = robot.tree
     movers = [tree.mover(name) for name in (a, b)]
     inward = [None if body.parent is None else tree.mover(body.parent).name for body in movers]

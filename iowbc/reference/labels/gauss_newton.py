@@ -1,4 +1,4 @@
-"""Gauss-Newton steps under constraints: the cost of a posture, linearised, a step, and a start by kinematics alone."""
+"""Gauss-Newton steps under constraints: linearised cost of a posture, a step, and a start from kinematics alone."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -15,9 +15,9 @@ from iowbc.reference.labels.support_model import SupportModel, posture_weights
 REGULARISATION = 1e-9
 """Added to the reduced Hessian, relative to its largest entry: the QP solver needs it positive definite."""
 UNBOUNDED = 1e30
-"""A bound that daqp takes for none."""
+"""daqp's value of an absent bound."""
 SOLVED = 1
-"""daqp's exit flag of an optimum."""
+"""daqp's exit flag for an optimum."""
 
 
 def constrained_step(
@@ -52,7 +52,7 @@ class PostureCost:
     gradient: Array
     """(21, 21)."""
     error: Array
-    """Both soles from their places, (12,)."""
+    """Errors of both soles from their places, (12,)."""
     equality: Array
     """(12, 21)."""
 
@@ -60,7 +60,7 @@ class PostureCost:
     def at(
         cls, support: SupportModel, height: Literal["pelvis", "com"], q: Array, sample: Sample, rest: Array
     ) -> "PostureCost":
-        """The cost of configuration `q` (22,); `rest` (15,): joints that the posture is drawn to."""
+        """The cost of configuration `q` (22,); `rest` (15,): reference of the posture cost."""
         model, data = support.model, support.data
         com_rows = pinocchio.jacobianCenterOfMass(model, data, q)
         pinocchio.updateFramePlacements(model, data)
@@ -82,7 +82,7 @@ class PostureCost:
 
 
 def cost_weights(support: SupportModel) -> tuple[Array, Array]:
-    """Roots of the weights of the residual: those of the task (6,), and of the posture (15,)."""
+    """Square roots of the weights of the residual: task (6,) and posture (15,)."""
     problem = support.problem
     task = [problem.com_weight] * 2 + [problem.height_weight] + [problem.torso_weight] * 3
     return np.sqrt(task), np.sqrt(posture_weights(support.robot, problem))

@@ -1,4 +1,4 @@
-"""The labeller of a worker process: samples by number, posture, gates."""
+"""Labeller of a worker process: samples by number, posture, gates."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,7 +28,7 @@ class Solver(Protocol):
 
 @dataclass(frozen=True)
 class LabelTask:
-    """Description of a labeller, from which a worker process makes it."""
+    """Specification from which a worker process builds its labeller."""
 
     robot: Path
     recipe: ReferenceGenerator
@@ -41,7 +41,7 @@ class LabelTask:
 
 
 class Labeller:
-    """Draws, solves and judges samples."""
+    """Draws, solves and checks samples."""
 
     def __init__(self, task: LabelTask) -> None:
         robot, recipe = load_robot(task.robot), task.recipe

@@ -1,8 +1,8 @@
-"""The multi-contact optimal control problem over a horizon (paper eq. 4), with the arms locked, solved by BoxFDDP.
+"""Multi-contact optimal control problem over a horizon (paper eq. 4), with the arms locked, solved by BoxFDDP.
 
 Full dynamics and both feet in contact. The robot starts at rest in a posture that meets the command by kinematics, and
-settles into the one that is held with the least cost; the label is a node before the end of the horizon, where neither
-the start nor the end bends it any more.
+settles into the one of least cost. The label is a node before the end of the horizon, where neither start nor end have
+an influence.
 """
 
 from typing import Any
@@ -20,7 +20,7 @@ from iowbc.reference.labels.soles import SoleLimits, sole_limits
 from iowbc.reference.labels.support_model import SupportModel, posture_weights
 
 STOP = 1e-10
-"""Expected improvement at which the solver ends; crocoddyl's own 5e-5 leaves flat postures where they started."""
+"""Expected improvement at which the solver stops; crocoddyl's 5e-5 leaves flat postures where they started."""
 FACETS = 4
 """Sides of the friction pyramid."""
 
@@ -56,7 +56,7 @@ class OptimalControlMethod:
         running = self._action(self._costs(sample, terminal=False), contacts, self.ocp.step)
         terminal = self._action(self._costs(sample, terminal=True), contacts, 0.0)
         problem = crocoddyl.ShootingProblem(start, [running] * self.ocp.nodes, terminal)
-        problem.nthreads = 1  # the processes are the parallelism; its own threads would wait in loops for each other
+        problem.nthreads = 1  # parallel over processes; its own threads would busy-wait
         states = [start] * (self.ocp.nodes + 1)
         solver = crocoddyl.SolverBoxFDDP(problem)
         solver.th_stop = STOP
@@ -81,7 +81,7 @@ class OptimalControlMethod:
         return contacts
 
     def _costs(self, sample: Sample, *, terminal: bool) -> Any:
-        """The running cost, or that of the end: no torques or contact forces, velocities held to rest."""
+        """The running cost, or the terminal one: no torques or contact forces, velocities held to rest."""
         state, nu, problem, support = self.state, self.actuation.nu, self.problem, self.support
         factor = self.ocp.terminal_factor if terminal else 1.0
         velocity = self.ocp.terminal_velocity_weight / factor if terminal else self.ocp.velocity_weight

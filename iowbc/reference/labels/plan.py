@@ -14,10 +14,10 @@ from iowbc.robot.mirror import interaction_mirror
 
 
 class SamplePlan:
-    """Sample number i as a function of the recipe and the seed alone.
+    """Samples by number; sample i depends only on the recipe and the seed.
 
-    After the drawn samples comes the grid of the feasible map, with two arm postures: the default one, which leans with
-    the trunk, and one that keeps the wrists where they are ahead of an upright trunk, as wrist commands do.
+    The drawn samples are followed by the grid of the feasible map, with two arm postures: the default one, which leans
+    with the trunk, and one that keeps the wrists where they are ahead of an upright trunk, as wrist commands do.
     """
 
     def __init__(self, robot: Robot, recipe: ReferenceGenerator, seed: int) -> None:

@@ -1,7 +1,7 @@
 """Labels samples in worker processes, in shards on disk; a native crash of a solver costs one sample.
 
-Only what a solver does to itself rejects a sample. A worker that was killed from outside says nothing about its
-sample, and the dataset must not depend on that.
+A dying worker rejects its sample only if the solver crashed. After a kill from outside the sample is retried, so that
+the dataset does not depend on it.
 """
 
 import multiprocessing
@@ -26,18 +26,18 @@ from iowbc.reference.labels.shards import Shard, cut, merge, read_shard, write_s
 
 CRASHED = "solver crashed"
 CRASHES = tuple(-number for number in (signal.SIGSEGV, signal.SIGABRT, signal.SIGFPE, signal.SIGBUS, signal.SIGILL))
-"""Exit codes of a worker that its sample brought down; after any other death the sample is tried again."""
+"""Exit codes of a worker whose solver crashed; after any other death the sample is retried."""
 TRIES = 5
-"""Deaths of other kinds that a labelling bears before it gives up."""
+"""Number of other deaths at which labelling fails."""
 POLL = 0.2
-"""Seconds between looks at the interruption flag."""
+"""Interval of checking for interruption [s]."""
 STARTS_WITHOUT_WORK = 3
-"""Workers that may die before their first sample until the pool gives up."""
+"""Number of workers that die before their first sample at which labelling fails."""
 IDLE = -1
 
 
 class SolverTask(Protocol):
-    """A picklable description of a solver."""
+    """Picklable specification of a solver."""
 
     def prepare(self) -> Solver:
         """The solver; called once in each worker."""
@@ -48,13 +48,13 @@ class _Worker:
     process: SpawnProcess
     connection: Connection
     current: Any
-    """Shared number of the sample in work."""
+    """Shared number of the current sample."""
     chunk: int | None = None
 
 
 @dataclass
 class _Queue:
-    """The chunks that remain, and the samples that brought a worker down."""
+    """Remaining chunks, and samples that crashed a worker."""
 
     waiting: list[int]
     crashed: dict[int, list[int]] = field(default_factory=dict)
@@ -75,7 +75,7 @@ def label_all(
 ) -> Shard:
     """Labels the samples with these numbers. The result does not depend on the number of workers.
 
-    Shards in `folder` that belong to `key` are reused, others made anew. Raises `Interrupted` when `interrupted()`
+    Shards in `folder` that belong to `key` are reused, others recomputed. Raises `Interrupted` when `interrupted()`
     turns true, WorkerFailed when a worker fails in Python or cannot start, or when too many are killed.
     """
     folder.mkdir(parents=True, exist_ok=True)
@@ -134,7 +134,7 @@ def _assign(worker: _Worker, queue: _Queue, chunks: Sequence[Sequence[int]], pat
 
 
 def _receive(worker: _Worker) -> int | None:
-    """The chunk that is done; None when the worker died."""
+    """The finished chunk; None if the worker died."""
     try:
         number, failure = worker.connection.recv()
     except (EOFError, ConnectionResetError):
@@ -145,7 +145,7 @@ def _receive(worker: _Worker) -> int | None:
 
 
 def _on_death(worker: _Worker, queue: _Queue) -> None:
-    """Notes the sample on which a worker died, and puts its chunk back in the queue."""
+    """Records the sample on which a worker died, and puts its chunk back in the queue."""
     worker.process.join()
     worker.connection.close()
     sample = int(worker.current.value)

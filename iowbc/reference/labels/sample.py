@@ -1,4 +1,4 @@
-"""Samples of the dataset, and the postures that answer them."""
+"""Samples of the dataset, and the support postures that label them."""
 
 from dataclasses import dataclass
 
@@ -23,7 +23,7 @@ class Sample:
         return float(self.command[0])
 
     def torso_rotation(self) -> Array:
-        """Commanded torso orientation against the feet: a turn about the lateral axis by the pitch, shape (3, 3)."""
+        """Commanded torso orientation relative to the feet: a pitch about the lateral axis, shape (3, 3)."""
         level = np.zeros(())
         return rotations.matrix(rotations.from_euler(level, self.command[1], level))
 

@@ -1,4 +1,4 @@
-"""Labels in pieces on disk, with which an interrupted stage goes on."""
+"""Labels in shards on disk, from which an interrupted stage resumes."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from iowbc.files import newest_checked, write_checked
 
 @dataclass(frozen=True)
 class Shard:
-    """Labels of some samples and the reasons why others have none."""
+    """Labels of some samples, and reasons for rejecting others."""
 
     kept: Indices
     """Numbers of the labelled samples, shape (k,)."""
@@ -22,11 +22,11 @@ class Shard:
     rejected: Indices
     """Numbers of the samples without a label, shape (r,)."""
     reasons: Sequence[str]
-    """Why, one for each of them."""
+    """Reason for each rejection."""
 
 
 def cut(indices: Sequence[int], size: int, folder: Path) -> tuple[list[list[int]], list[Path]]:
-    """Samples in chunks of a size, and the file of each chunk's shard in a folder."""
+    """Chunks of samples, and the shard file of each chunk."""
     chunks = [list(indices[start : start + size]) for start in range(0, len(indices), size)]
     return chunks, [folder / f"{number:05d}.shard" for number in range(len(chunks))]
 
@@ -59,7 +59,7 @@ def read_shard(path: Path, key: str, indices: Sequence[int]) -> Shard | None:
 
 
 def merge(shards: Sequence[Shard]) -> Shard:
-    """All shards as one, sorted by sample number."""
+    """Joins shards, sorted by sample number."""
     kept = np.concatenate([shard.kept for shard in shards])
     rejected = np.concatenate([shard.rejected for shard in shards])
     reasons = [reason for shard in shards for reason in shard.reasons]

@@ -53,7 +53,7 @@ class StaticMethod:
     def equilibrium(
         self, q: Array, wrench: Array, sample: Sample, rest: Array
     ) -> tuple[PostureCost, Array, Array, Array, Array]:
-        """At (q, wrench): cost without torques, joint torques and their rows, equality rows and error."""
+        """Linearisation at (q, wrench): cost without torques, joint torques and their rows, equality rows and error."""
         support, nv = self.support, self.velocities
         forces = ground_forces(support.model, support.soles, wrench)
         by_position = pinocchio.computeStaticTorqueDerivatives(support.model, support.data, q, forces)

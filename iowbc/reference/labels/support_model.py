@@ -11,7 +11,7 @@ from iowbc.reference.labels.sample import Sample
 from iowbc.robot.description import Robot
 
 BASE_RANGE = 10.0
-"""Bound on the floating base's position [m]; pinocchio's reader leaves ±1.01, which optimisers take for a limit."""
+"""Bound on the floating base's position [m]; pinocchio's reader sets ±1.01, which optimisers take for a limit."""
 ROOT = "root_joint"
 """Name that crocoddyl's floating-base actuation looks for."""
 
@@ -41,7 +41,7 @@ def build_model(robot: Robot) -> Any:
 
 
 class SupportModel:
-    """Base and support joints in the robot's order; `lock` sets what the arms add."""
+    """Base and support joints in the robot's order; `lock` adds the arms' inertia."""
 
     def __init__(self, robot: Robot, problem: PostureProblem) -> None:
         self.robot, self.problem = robot, problem
@@ -68,7 +68,7 @@ class SupportModel:
         self.effort = problem.effort_fraction * robot.effort[robot.support]
 
     def lock(self, sample: Sample) -> None:
-        """Gives the torso the inertia of the arms in their posture."""
+        """Adds the inertia of the arms in their posture to the torso."""
         q = self._neutral.copy()
         q[7 + self.robot.interaction] = sample.arm
         pinocchio.forwardKinematics(self.full, self.full_data, q)
@@ -96,7 +96,8 @@ class SupportModel:
         return q
 
     def rest(self, sample: Sample) -> Array:
-        """The posture that a label is drawn to, shape (22,): the default one, with the lean of a waist that pitches."""
+        """Reference of the posture cost, shape (22,): default posture, with part of the commanded pitch in the
+        waist."""
         q = self.start()
         waist = self.robot.waist_pitch
         lean = q[7 + waist] + self.problem.waist_share * sample.command[1] / max(len(waist), 1)

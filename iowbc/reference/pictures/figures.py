@@ -23,10 +23,10 @@ INK, SOFT, WARM = "#1f3b57", "#8fb1cc", "#d1603d"
 PALE = "#e4ebf1"
 BINS, FEWEST_BINS = 60, 20
 SHOWN = 99.8
-"""Percentile at which the axis of an error ends, so that a single outlier does not squeeze the rest."""
+"""Percentile at which the axis of an error ends, so that single outliers do not stretch it."""
 
 Limit = tuple[float, str]
-"""A limit and what it holds for."""
+"""Limit and its label."""
 
 
 def dataset_figures(
@@ -37,7 +37,7 @@ def dataset_figures(
     rejected: Mapping[str, int],
     check: MethodComparison | None,
 ) -> None:
-    """Feasible map, reasons of rejection, what the labels need, and the comparison with optimal control."""
+    """Feasible map, reasons of rejection, effort and margin of the labels, and the comparison with optimal control."""
     write_figure(_labelled_map(plan, region), folder / "labelled_map.png")
     counts = {"kept": len(dataset), **rejected}
     figure, (axes,) = _figure(1, 1, 6.0, 0.8 + 0.4 * len(counts))
@@ -99,7 +99,7 @@ def error_figures(
 
 
 def gentle_figure(folder: Path, plan: SamplePlan, region: GentleRegion, held: FeasibleMap) -> None:
-    """The feasible map over how far the reference moves for one step of the command."""
+    """The feasible map, and the largest joint move of the reference for one step of the command."""
     figure, (axes,) = _figure(1, 1, 6.0, 4.2)
     shown = _on_grid(axes, plan, region.jump, "Blues_r", 2.0 * plan.recipe.feasible.jump)
     figure.colorbar(shown, ax=axes, label="largest joint move for one step [rad]", extend="max")
@@ -172,7 +172,7 @@ def histogram(
     counted: str = "samples",
     everything: bool = False,
 ) -> None:
-    """Counts, with the limit as a dashed line; says how many lie beyond the axis where not `everything` is drawn."""
+    """Histogram with the limit as a dashed line; without `everything` it gives the number of values beyond the axis."""
     low, high = float(values.min()), float(values.max() if everything else np.percentile(values, SHOWN))
     if limit is not None:
         low, high = min(low, limit[0]), max(high, limit[0])

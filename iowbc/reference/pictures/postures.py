@@ -1,4 +1,4 @@
-"""A picture of rendered postures over height and torso pitch: what the robot can hold."""
+"""Picture of rendered support postures over height and torso pitch."""
 
 from itertools import product
 from pathlib import Path
@@ -20,9 +20,9 @@ from iowbc.robot.description import Robot
 from iowbc.sim.rendering.offscreen import Image, Offscreen
 
 HEIGHTS, PITCHES = 4, 7
-"""Postures down and across."""
+"""Rows and columns of postures."""
 SIZE = 260
-"""Edge of a rendered posture [pixel]."""
+"""Width and height of a rendered posture [pixel]."""
 AZIMUTH, ELEVATION, DISTANCE, LOOK_AT = 125.0, -12.0, 1.9, (0.1, 0.0, 0.58)
 """Camera [degree, degree, m, m]."""
 EMPTY = 235
@@ -30,9 +30,9 @@ EMPTY = 235
 
 
 def draw_strip(path: Path, robot: Robot, recipe: ReferenceGenerator, plan: SamplePlan) -> None:
-    """Labels a small grid by the static method and draws it. Raises NoRenderer where nothing can be drawn.
+    """Labels a small grid by the static method and draws it. Raises NoRenderer without a renderer.
 
-    The arms are in the default posture, or keep the wrists ahead of the pelvis where that one has no label.
+    The arms are in the default posture, or keep the wrists ahead of the pelvis if that has no label.
     """
     heights = np.interp((np.arange(HEIGHTS)[::-1] + 0.5) / HEIGHTS, [0.0, 1.0], plan.heights[[0, -1]])
     places = np.linspace(0, len(plan.pitches) - 1, PITCHES).round().astype(int)

@@ -17,10 +17,10 @@ from iowbc.sim.model_index import ModelIndex
 
 @dataclass(frozen=True)
 class Forces:
-    """What acted in the physics steps of a control period, world frame."""
+    """Forces in the physics steps of a control period, world frame."""
 
     torque: Array
-    """Of the motors in the last step, (joints,) [N·m]."""
+    """Motor torques in the last step, (joints,) [N·m]."""
     feet: Array
     """On the feet from what they touch: torque about the origin, and force, (2, substeps, 6) [N·m, N]."""
     hands: Array
@@ -33,7 +33,7 @@ class DrakeEnvironment:
     """A plant with its state and inputs."""
 
     def __init__(self, model: Any, settings: Drake, layout: ModelIndex, *, implicit: bool, yaw_arm: float) -> None:
-        """`implicit`: the damping of the joint control is solved for in each step; `yaw_arm`: see
+        """`implicit`: the damping of the joint control is integrated implicitly; `yaw_arm`: see
         `iowbc.recipe.simulation.scene.Scene` [m]."""
         self._model, self._implicit = model, implicit
         self._slow, self._arm = settings.stiction, yaw_arm
@@ -59,7 +59,7 @@ class DrakeEnvironment:
         self._index(model)
 
     def _index(self, model: Any) -> None:
-        """Where the plant's positions and velocities lie in the model's; those of a floating joint are turned round,
+        """Maps the plant's positions and velocities to the model's. Those of a floating joint begin with the rotation,
         and its angular velocity is in the world frame."""
         from_position, from_speed = np.zeros(model.nq, np.intp), np.zeros(model.nv, np.intp)
         self._floating: list[tuple[slice, slice]] = []
@@ -96,7 +96,7 @@ class DrakeEnvironment:
         return position, speed
 
     def advance(self, targets: Array, torque_range: Array, applied: Array, held: Mask, resistance: float) -> Forces:
-        """One control period from the state that is set. `targets` of the joint controllers, (substeps, joints) [rad];
+        """One control period from the current state. `targets` of the joint controllers, (substeps, joints) [rad];
         `torque_range` of each motor, (joints, 2) [N·m]; `applied`: force and torque on each body about its centre of
         mass, world frame, (bodies, 6) [N, N·m]; `held`: grips that hold; `resistance`: of a crate's wheels [N]."""
         tree, context, substeps = self.tree, self.context, len(targets)
@@ -124,8 +124,8 @@ class DrakeEnvironment:
         return forces
 
     def _drive(self, target: Array, torque_range: Array) -> Array:
-        """Sets the motors for a step; their torques, (joints,) [N·m]. Where one is not at its limit, an implicit
-        damping of the joint control is given to Drake as damping of the joint."""
+        """Sets the motors for a step; their torques, (joints,) [N·m]. For a motor below its limit, an implicit damping
+        of the joint control is passed to Drake as joint damping."""
         state = self.tree.GetPositionsAndVelocities(self.context)
         spring = self._kp * (target - state[self._motor_position])
         torque = spring - self._kd * state[self._motor_speed]
@@ -140,8 +140,8 @@ class DrakeEnvironment:
         return bounded
 
     def _brake(self, crate: Any, resistance: float) -> None:
-        """Rolling resistance -R w / |w| of the crate, w = (x, y, arm · yaw), as damping R / |w| solved for in the step:
-        the lagged law has the same limit, and lets a crate at rest creep below the speed of regularisation."""
+        """Rolling resistance -R w / |w| of the crate, w = (x, y, arm · yaw), as implicit damping R / |w| with |w|
+        before the step. The limit is the same, but a crate at rest creeps below the speed of regularisation."""
         scale = np.array([1.0, 1.0, self._arm])
         first = crate.velocity_start()
         moving = scale * self.tree.GetVelocities(self.context)[first : first + 3]

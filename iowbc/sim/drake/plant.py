@@ -36,7 +36,7 @@ from iowbc.sim.model import GROUND_BIT
 
 FREE = mujoco.mjtJoint.mjJNT_FREE.value
 SPRINGLESS = 1e-9
-"""Stiffness of the actuator that stands for dry friction [N·m/rad]: Drake asks for a positive one."""
+"""Stiffness of the actuator that stands for dry friction [N·m/rad]: Drake requires a positive one."""
 MOST_FRICTION = 1.9
 """Greatest coefficient of friction that can be reached: a harmonic mean with 1 stays below 2."""
 GROUND = 100.0
@@ -165,7 +165,7 @@ def _ring(outward: Array, radius: float) -> list[Array]:
 
 
 def _exclude(model: Any, scene_graph: Any, shapes: list[list[Any]]) -> None:
-    """Lets those shapes pass through each other whose bits in the model say so."""
+    """Excludes collisions of shapes whose contact bits in the model do not match."""
     present = [geom for geom, own in enumerate(shapes) if own]
     is_a, touches = model.geom_contype, model.geom_conaffinity
     filters = CollisionFilterDeclaration()

@@ -18,8 +18,8 @@ from iowbc.sim.world import FEET, HANDS, THING, World
 
 
 class DrakeWorld(World):
-    """n environments of one scene. Drake takes the steps; MuJoCo holds the numbers and states, and computes what
-    follows from a state by kinematics alone."""
+    """n environments of one scene. Drake integrates the physics; MuJoCo holds parameters and states, and computes the
+    kinematics."""
 
     def __init__(
         self, robot: Robot, physics: Physics, scene: Scene, rows: Indices, timing: Timing, settings: Drake
@@ -29,7 +29,7 @@ class DrakeWorld(World):
         self._steps = Timing(timing.period, settings.timestep, timing.longest_latency)
         n = len(rows)
         self._lag = np.zeros(n, np.intp)
-        """Physics steps by which the motors follow their targets late, (n,)."""
+        """Latency of the motors in physics steps, (n,)."""
         self._targets = np.zeros((n, self._steps.kept_targets + self._steps.substeps - 1, len(robot.joints)))
         """Targets of the physics steps of the longest latency and of the last control period, the oldest first."""
         self._memory.update(lag=self._lag, targets=self._targets)
@@ -69,7 +69,7 @@ class DrakeWorld(World):
                 diverged[index] = not self._step_one(index, environment, given)
 
     def _step_one(self, index: int, environment: DrakeEnvironment, given: Period) -> bool:
-        """Whether Drake found a solution in each step of the period."""
+        """Steps one environment. False if Drake found no solution in a step of the period."""
         last, applied = self._targets.shape[1] - self._lag[index], self._applied[index]
         held = self._connected[index] > 0.5
         targets = self._targets[index, last - self._steps.substeps : last]

@@ -57,7 +57,7 @@ class Appearance:
 
 
 def dressed_model(robot: Robot, physics: Physics, scene: Scene, timing: Timing) -> Any:
-    """Compiled model with the same positions and velocities as the stepped one, and looks."""
+    """Compiled model with the same positions and velocities as the stepped one, with visual geometry."""
     spec = scene_spec(robot, physics, scene, timing, dressed=True)
     _dress(spec)
     meshes = list(installed_meshes(robot))
@@ -67,7 +67,7 @@ def dressed_model(robot: Robot, physics: Physics, scene: Scene, timing: Timing) 
 
 
 def installed_meshes(robot: Robot) -> Iterator[Mesh]:
-    """Meshes that `example-robot-data` has for the robot; none where it is not installed or does not know the robot."""
+    """Meshes that `example-robot-data` has for the robot; none if it is not installed or lacks the robot."""
     shared = Path(sysconfig.get_paths()["purelib"]) / "cmeel.prefix" / "share" / "example-robot-data" / "robots"
     folder = shared / f"{robot.name}_description"
     trees = [ElementTree.parse(file).getroot() for file in sorted(folder.glob("urdf/*.urdf"))]

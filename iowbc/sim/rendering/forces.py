@@ -38,12 +38,12 @@ class Force:
 
     @property
     def end(self) -> Array:
-        """Where the arrow points, (3,) [m]."""
+        """Tip of the arrow, (3,) [m]."""
         return self.start + METRES_PER_NEWTON * self.force
 
 
 def forces(simulation: Simulation, env: int) -> Iterator[Force]:
-    """The forces that are worth an arrow in the last control period."""
+    """Forces of the last control period, of at least `SMALLEST_FORCE`."""
     for force in _all(simulation, env):
         if np.linalg.norm(force.force) >= SMALLEST_FORCE:
             yield force

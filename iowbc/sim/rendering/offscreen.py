@@ -13,7 +13,7 @@ from iowbc.sim.rendering.backend import context
 Image = NDArray[np.uint8]
 
 MARGIN = 200
-"""Room for arrows among the things to draw."""
+"""Number of geoms reserved for arrows."""
 
 
 class Offscreen:
@@ -39,7 +39,7 @@ class Offscreen:
         self._image = np.zeros((height, width, 3), np.uint8)
 
     def draw(self, data: Any, add: Callable[[], None] = lambda: None) -> Image:
-        """The model in the state of `data`, (height, width, 3); `add` puts more into the scene before it is drawn."""
+        """The model in the state of `data`, (height, width, 3); `add` adds geoms to the scene before it is drawn."""
         self._context.make_current()
         mujoco.mjv_updateScene(
             self._model, data, self._option, None, self.camera, mujoco.mjtCatBit.mjCAT_ALL.value, self.scene

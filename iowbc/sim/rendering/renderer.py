@@ -10,7 +10,7 @@ from iowbc.sim.rendering.offscreen import Image, Offscreen
 from iowbc.sim.simulation import Simulation
 
 VIEW = {"distance": 2.6, "azimuth": 125.0, "elevation": -12.0}
-"""Of the camera [m, degrees]."""
+"""View of the camera [m, degrees]."""
 
 
 class SceneRenderer(Offscreen):
@@ -30,7 +30,7 @@ class SceneRenderer(Offscreen):
         return self.draw(data, self._draw_forces)
 
     def _aim(self) -> Array:
-        """Between the ground and the pelvis, on the side of the object."""
+        """Camera target: between ground and pelvis, shifted towards the object."""
         state = self._simulation.state
         aim: Array = state.base_position[self._env].copy()
         if state.has_object[self._env]:

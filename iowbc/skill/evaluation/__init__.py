@@ -1,1 +1,1 @@
-"""Games of trained skills and of rivals, their tables and figure."""
+"""Games of trained skills and baselines, their tables and figure."""

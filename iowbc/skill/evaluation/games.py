@@ -1,4 +1,4 @@
-"""The games of `skill-eval`: every skill and rival plays the same episodes, some on controllers of other recipes."""
+"""Games of `skill-eval`: all skills and baselines play the same episodes, some on controllers of other recipes."""
 
 import itertools
 from collections.abc import Callable, Iterator, Sequence
@@ -22,32 +22,32 @@ from iowbc.skill.plan import AGENT, Plan, Rule
 from iowbc.task.specification import Specification
 
 OF_CONTROLLER = ("control_frequency", "commands", "references", "action")
-"""Parts of `task` that belong to a controller; all others are of the games."""
+"""Parts of `task` that belong to a controller; the others belong to the games."""
 
 
 @dataclass(frozen=True)
 class Competitor:
-    """A skill, or a rival without one."""
+    """A trained skill, or a scripted baseline."""
 
     label: str
     training: str
-    """Distinguishes trainings under one label."""
+    """Distinguishes trainings with the same label."""
     rule: Rule | None
     robot: TeacherNetwork | None
     """The trained policy; None acts as the rule says."""
     controller: str = ""
-    """Label of the controller that it commands; empty for that of the recipe."""
+    """Label of the controller below; empty for that of the recipe."""
 
 
 def planned_games(skill: Skill, learnt_human: bool) -> list[Plan]:
-    """All episodes of an evaluation. `learnt_human`: whether there is one to play with."""
+    """All episodes of an evaluation. `learnt_human`: true if there is a trained human."""
     asked, kinds = skill.eval, skill.partners
     partners = asked.partners or (*kinds.training, *kinds.held_out, *([AGENT] if learnt_human else []))
     tasks = {name: getattr(skill.tasks, name) for name in asked.tasks or skill.tasks.names}
     found = []
     for (name, task), known, partner in itertools.product(tasks.items(), asked.known, partners):
         if partner == "follower" and not known:
-            continue  # a human who follows shows nobody the goal
+            continue  # a follower does not reveal the goal
         low, high = task.mass
         masses = asked.masses.get(task.scene) or [low + load * (high - low) for load in asked.loads]
         for mass, episode in itertools.product(masses, range(asked.episodes)):
@@ -65,10 +65,10 @@ def play_batches(
     work: Path,
     interrupted: Callable[[], bool],
 ) -> Iterator[pd.DataFrame]:
-    """Rows of a competitor's episodes, batch by batch; one that is finished is kept in `work`.
+    """Rows of a competitor's episodes, batch by batch; finished batches are kept in `work`.
 
-    `human`: the learnt one, the same for every competitor; `controller`: the one that the competitor commands, and its
-    world; `workers`: see `TransportGame`. Raises Interrupted where the job is asked to stop.
+    `human`: the learnt one, the same for every competitor; `controller`: the world and student below the competitor;
+    `workers`: see `TransportGame`. Raises Interrupted when interrupted.
     """
     for begin in range(0, len(planned), settings.games):
         batch = planned[begin : begin + settings.games]
@@ -93,7 +93,7 @@ def play_batches(
 
 
 def _require_fitting(competitor: Competitor, size: int) -> None:
-    """Raises StageFailed where a skill observes something else than the games show."""
+    """Raises StageFailed if the observation sizes of skill and games differ."""
     if competitor.robot is not None and (own := len(competitor.robot.normalizer.mean)) != size:
         text = f"that skill observes {own} numbers, this game shows {size}"
         advice = "train it with the same `skill` section and code"
@@ -101,10 +101,10 @@ def _require_fitting(competitor: Competitor, size: int) -> None:
 
 
 def on_controller(world: Specification, label: str, own: Task, student: Student, rg: Path | None) -> Specification:
-    """The games of a world with another controller. `label`: its name in `skill.eval.controllers`; `own`: the task for
-    which its `student` was trained; `rg`: folder of its reference generator.
+    """Specification of the same games with another controller. `label`: its name in `skill.eval.controllers`; `own`:
+    the task for which its `student` was trained; `rg`: folder of its reference generator.
 
-    Raises StageFailed where the controller has no grasp for a scene of the games, or observes what they do not show.
+    Raises StageFailed if the controller has no grasp for a scene of the games, or observes more than they provide.
     """
     where, recipe = f"skill.eval.controllers.{label}", world.recipe
     shown = observation_layout(load_robot(world.robot), recipe.task.observation.observe_object).size
@@ -112,7 +112,7 @@ def on_controller(world: Specification, label: str, own: Task, student: Student,
         text = f"its student observes {student.observation} numbers, these games show {shown}"
         raise StageFailed(f"{where}: {text}; set task.observation.observe_object in the recipe of the games")
     task, scenes = own.model_dump(include=set(OF_CONTROLLER)), recipe.simulation.scenes.names
-    for kind in ("grasps", "loads"):  # those of scenes that only its own recipe has are of no use here
+    for kind in ("grasps", "loads"):  # drop scenes that the games do not have
         entries = task["references"][kind].items()
         task["references"][kind] = {scene: entry for scene, entry in entries if scene in scenes}
     try:

@@ -14,7 +14,7 @@ from iowbc.results.table import ABSENT, Cell, Table, heads
 
 FORCE, SUCCESS = "partner_force_p90", "success"
 UNIT = ["task", "known", "partner", "mass", "episode"]
-"""What makes an episode the same for every competitor."""
+"""Columns that identify an episode across competitors."""
 COLUMNS = {
     FORCE: ("Partner force p90 [N]", ".1f"),
     "partner_work": ("Partner work [J]", ".1f"),
@@ -25,14 +25,14 @@ COLUMNS = {
     "load_share": ("Load share", ".2f"),
     "time": ("Time [s]", ".1f"),
 }
-"""Figures of an episode with their heads and forms, in the order in which tables show them."""
+"""Metrics of an episode with column heading and number format, in table order."""
 SEEDS_OF_THE_BOOTSTRAP = 0
 
 Values = NDArray[np.float64]
 
 
 def tables(games: pd.DataFrame, held_out: tuple[str, ...]) -> list[Table]:
-    """All tables. `games`: a row an episode; `held_out`: partners that training does not meet."""
+    """All tables. `games`: one row per episode; `held_out`: partners that training does not use."""
     who = np.where(games["partner"].isin(held_out), "held-out partners", "partners of training")
     who = np.where(games["partner"] == "agent", "learnt human", who)
     goal = np.where(games["known"], "both know the goal", "only the human knows")
@@ -101,7 +101,7 @@ def estimate(games: pd.DataFrame, figure: str, whole: bool = False) -> Bootstrap
 
 
 def by_training(games: pd.DataFrame, figure: str) -> Values:
-    """A figure by training and episode, (trainings, episodes)."""
+    """A metric by training and episode, (trainings, episodes)."""
     wide = games.assign(**{figure: games[figure].astype(np.float64)}).pivot(
         index="training", columns=UNIT, values=figure
     )
@@ -109,13 +109,13 @@ def by_training(games: pd.DataFrame, figure: str) -> Values:
 
 
 def worst_partner(games: pd.DataFrame) -> Bootstrapped:
-    """The greatest interquartile mean of the force of one partner."""
+    """Highest interquartile mean of the force over partners."""
     found = [estimate(own, FORCE) for _, own in games.groupby("partner")]
     return max(found, key=lambda one: one.value)
 
 
 def improvement(first: pd.DataFrame, other: pd.DataFrame) -> Bootstrapped:
-    """Probability that the first has the smaller force in the same episode, ties half."""
+    """Probability that the first has the smaller force in the same episode; ties count half."""
     own, theirs = by_training(first, FORCE), by_training(other, FORCE)
     wins = (own[:, None] < theirs[None]) + 0.5 * (own[:, None] == theirs[None])
     flat = wins.reshape(-1, wins.shape[-1])
@@ -138,7 +138,7 @@ def _cell(ends: tuple[float, ...], form: str) -> Cell:
 
 
 def headline(games: pd.DataFrame) -> dict[str, float]:
-    """Force, worst partner and success of each competitor, in games that only the human knows and in the others."""
+    """Force, worst partner and success of each competitor, by whether both or only the human know the path."""
     found: dict[str, float] = {}
     for (label, known), own in games.groupby(["label", "known"], sort=False):
         name = f"{label}/{'known' if known else 'human_only'}".replace(" ", "_")
@@ -152,7 +152,7 @@ def headline(games: pd.DataFrame) -> dict[str, float]:
 
 
 def figure(games: pd.DataFrame) -> Figure:
-    """Force and success by partner, in games of both kinds."""
+    """Force and success by partner and by whether the robot knows the path."""
     labels = list(dict.fromkeys(games["label"]))
     kinds = [known for known in (True, False) if known in set(games["known"])]
     drawing = Figure(figsize=(11.0, 3.2 * len(kinds)), layout="constrained")

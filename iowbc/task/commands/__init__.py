@@ -1,1 +1,1 @@
-"""Where commands come from: drawn in training, scripted in trials."""
+"""Sources of commands: random in training, scripted in trials."""

@@ -1,4 +1,4 @@
-"""Commands: drawn goals in training, scripts in trials, or a user's; rate-limited, clamped to what is feasible."""
+"""Commands: random goals in training, scripts in trials, or user input; rate-limited, clamped to the feasible map."""
 
 from collections.abc import Sequence
 
@@ -16,7 +16,7 @@ from iowbc.task.episode_state import EpisodeState
 
 
 class Commander:
-    """Sets goal and command of n environments, in their memory."""
+    """Sets goal and command of n environments, in their `EpisodeState`."""
 
     def __init__(
         self,
@@ -27,7 +27,7 @@ class Commander:
         pushing: Mask,
         period: float,
     ) -> None:
-        """`holding`: environments that begin with an object in the hands, `pushing`: with a crate before them, (n,)."""
+        """`holding`: environments that begin with an object in the hands, `pushing`: with a crate in front, (n,)."""
         commands = task.commands
         self._nominal, self._start = nominal_command(commands), np.where(holding, commands.holding_start, 1.0)[:, None]
         self._commands, self._curriculum, self._references, self._period = commands, task.curriculum, references, period
@@ -45,8 +45,8 @@ class Commander:
         self.scripted[:], self._drawn[:], self._any_script = True, False, True
 
     def start(self, which: Indices, memory: EpisodeState, key: Keys) -> None:
-        """First goals of new episodes; `key` (k,). A drawn episode starts standing, in its posture where it can,
-        or with an object in the hands on the way to it."""
+        """First goals of new episodes; `key` (k,). Episodes with drawn commands start standing, in the goal's posture
+        if startable; with an object in the hands, at a fraction `holding_start` of the way to it."""
         memory.draws[which] = 0
         self._draw(which, memory, key)
         command = self._references.startable(self._nominal + self._start[which] * (memory.goal[which] - self._nominal))

@@ -12,7 +12,7 @@ from iowbc.task.curriculum import Difficulty
 def draw_goals(commands: Commands, key: Keys, difficulty: Difficulty, *, pushing: Mask, walking: Mask) -> Array:
     """Goals (n, 11), a pure function of the keys (n,); ranges scaled by the difficulty.
 
-    pushing: environments with a crate before them, (n,); walking: those whose episode has commands to walk, (n,).
+    pushing: environments with a crate in front of them, (n,); walking: those whose episode commands velocities, (n,).
     """
     goals = np.empty((len(key), len(COMMAND)))
     goals[:, :3] = _velocities(commands, key, difficulty, pushing) * walking[:, None]
@@ -29,7 +29,7 @@ def draw_holding_time(commands: Commands, key: Keys) -> Array:
 
 
 def _velocities(commands: Commands, key: Keys, difficulty: Difficulty, pushing: Mask) -> Array:
-    """v_x, v_y, ω ~ U(range)·scale: some stand, go straight or turn on the spot; short ones are lengthened."""
+    """v_x, v_y, ω ~ U(range)·scale: a share is zero, straight or turning on the spot; low speeds are raised."""
     u = random.uniform(key, "command/velocity", 6)
     ranges = np.array([commands.velocity_x, commands.velocity_y, commands.yaw_rate])
     behind = np.array([commands.pushing.velocity_x, commands.pushing.velocity_y, commands.pushing.yaw_rate])
@@ -56,7 +56,7 @@ def _deep_pitch(commands: Commands, key: Keys, scale: Array) -> Array:
 
 
 def _posture(commands: Commands, key: Keys, scale: Array) -> Array:
-    """H, α ~ U(range) and Δp = shared + single offsets, drawn in towards the nominal posture by `scale`; (n, 8)."""
+    """H, α ~ U(range) and Δp = shared + single offsets, shrunk towards the nominal posture by `scale`; (n, 8)."""
     u = random.uniform(key, "command/posture", 2 + 3 + 6 + 1)
     low, high = np.array([commands.height, commands.pitch]).T
     nominal = np.array([commands.nominal_height, commands.nominal_pitch])

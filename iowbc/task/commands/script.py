@@ -1,4 +1,4 @@
-"""Scripted command sequences: the same walk for every policy that is compared."""
+"""Scripted command sequences: the same for all policies under comparison."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -12,14 +12,14 @@ from iowbc.control.command import COMMAND
 
 @dataclass(frozen=True)
 class CommandSegment:
-    """A stretch of a sequence: the command moves to `command` over `ramp` and then holds."""
+    """Segment of a sequence: the command moves to `command` over `ramp` and then holds."""
 
     duration: float
-    """How long the segment lasts, its ramp included [s]."""
+    """Duration of the segment, its ramp included [s]."""
     command: tuple[float, ...]
     """The 11 values that hold at the segment's end."""
     ramp: float = 0.0
-    """Time of the linear passage from the previous segment's values [s]."""
+    """Duration of the linear transition from the previous segment's values [s]."""
 
     def __post_init__(self) -> None:
         if len(self.command) != len(COMMAND):

@@ -1,4 +1,4 @@
-"""A single environment as a `gymnasium.Env`: the same world that the vector environment trains in."""
+"""A single environment as a `gymnasium.Env`: the same simulation as in the vector environment."""
 
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ from iowbc.task.vector.workers import InProcess
 Observation = NDArray[np.float32]
 RENDER_MODE = "rgb_array"
 RATE = 50
-"""Frames a second of a film in which every step is a frame; the recipe's own rate goes before it."""
+"""Default frames per second, one frame per step; each environment sets its recipe's control frequency instead."""
 
 
 class Environment(gymnasium.Env[Observation, Observation]):  # type: ignore[misc]
@@ -60,7 +60,7 @@ class Environment(gymnasium.Env[Observation, Observation]):  # type: ignore[misc
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Begins an episode; `seed` starts all that is random anew. `options` has no meaning here."""
+        """Starts an episode; `seed` reseeds all random numbers. `options` is ignored."""
         super().reset(seed=seed)
         if seed is not None or not self._begun:
             self.batch.reset(None if seed is None else np.array([seed], np.uint64))
@@ -68,7 +68,7 @@ class Environment(gymnasium.Env[Observation, Observation]):  # type: ignore[misc
         return self._buffers["observation"][0].copy(), {}
 
     def step(self, action: Observation) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """One control step; the observation is that at the episode's end where it ends."""
+        """One control step. At an episode's end it returns the terminal observation."""
         self._buffers["action"][0] = action
         self.batch.step()
         self._begun = bool(self._buffers["done"][0])
@@ -78,7 +78,7 @@ class Environment(gymnasium.Env[Observation, Observation]):  # type: ignore[misc
         return self._buffers[kind][0].copy(), reward, self._begun and not truncated, truncated, {}
 
     def render(self) -> NDArray[np.uint8] | None:
-        """A picture (height, width, 3), or None without a render mode; after an end it shows the next start."""
+        """A picture (height, width, 3), or None without a render mode; after an end it shows the next episode."""
         if self.render_mode is None:
             return None
         if self._renderer is None:

@@ -1,4 +1,4 @@
-"""Importing this module names single environments, one for each scene: `gymnasium.make("iowbc/Lift-v0")`."""
+"""Importing this module registers single environments, one for each scene: `gymnasium.make("iowbc/Lift-v0")`."""
 
 import gymnasium
 

@@ -1,1 +1,1 @@
-"""What is written down of each step."""
+"""Signals and counters recorded in each step."""

@@ -1,4 +1,4 @@
-"""What is written down of each step: signals and counters."""
+"""Records signals and counters of each step."""
 
 from collections import deque
 from pathlib import Path
@@ -20,14 +20,14 @@ from iowbc.task.rewards import terms
 from iowbc.task.vector.shared import Buffers
 
 TORSO_CENTRE = 0.25
-"""Height of the point whose motion is recorded as the torso's, above the pelvis along the torso [m]."""
+"""Distance along the torso from the pelvis to the point recorded as the torso's position [m]."""
 COLUMN = {name: index for index, name in enumerate(COUNTERS)}
 STANDING, WALKING = (slice(COLUMN[f"{kind}/steps"], COLUMN[f"{kind}/{ERRORS[-1]}"] + 1) for kind in KINDS)
 """Columns of steps and errors."""
 
 
 def keep_divergences(divergences: deque[Divergence], folder: Path | None) -> None:
-    """Moves what diverged into a folder, or nowhere."""
+    """Saves records of diverged simulations to a folder; without one, discards them."""
     while divergences:
         divergence = divergences.popleft()
         if folder is not None:
@@ -126,7 +126,7 @@ def count_endings(buffers: Buffers, ending: Ending, causes: dict[str, Mask], whi
 
 
 def count_pushes(buffers: Buffers, pushing: Mask, memory: EpisodeState, which: NDArray[np.intp]) -> None:
-    """Adds the pushes that begin, (k,), to the counters, and the infeasible ones; `pushing`: scenes, (n,)."""
+    """Counts the pushes that begin, (k,), and the infeasible ones; `pushing`: environments with a push scene, (n,)."""
     counters = buffers["counters"]
     counters[which, COLUMN["pushes"]] += pushing[which]
     counters[which, COLUMN["infeasible"]] += memory.infeasible[which]

@@ -1,4 +1,4 @@
-"""The signals and counters that an environment batch leaves for its parent each step."""
+"""Signals and counters that an environment batch writes for its parent in each step."""
 
 from collections.abc import Mapping
 
@@ -47,18 +47,18 @@ and its horizontal force in the last one [N]; the size of the net force of thigh
 force of partner, impulses and pulls on it [N]; the velocity of its far handle, and the one that the partner intends for
 it [m/s]."""
 JOINT_SIGNALS = ("joint_torque", "joint_saturation")
-"""Signals of planned episodes with a value a joint: torque [N·m], whether it is at its limit."""
+"""Signals of planned episodes with one value per joint: torque [N·m], whether it is at its limit."""
 ACTION_SIGNAL = "action"
-"""Signal of planned episodes with a value a support joint: what the action adds to the reference [rad]."""
+"""Signal of planned episodes with one value per support joint: offset that the action adds to the reference [rad]."""
 
 REASONS = ("fallen", "dropped", "lagging", "time_limit", "diverged")
-"""Why an episode ended."""
+"""Reasons for the end of an episode."""
 CAUSES = ("walking", "standing", "disturbed")
-"""What a robot was doing that fell: walking or standing, or it had just been disturbed."""
+"""Situations in which a robot falls: walking, standing, or just after a disturbance."""
 KINDS = ("standing", "walking")
-"""What a command asks for."""
+"""Kinds of command."""
 ERRORS = ("velocity", "heading", "height", "pitch")
-"""What is tracked: the size of v_sys - v_coll in the plane, filtered [m/s], heading [rad], height [m], pitch [rad]."""
+"""Tracking errors: the norm of v_sys - v_coll in the plane, filtered [m/s], heading [rad], height [m], pitch [rad]."""
 COUNTERS = (
     *("steps", "tracking", "episodes", "length", "return", *REASONS),
     *(f"fell/{cause}" for cause in CAUSES),
@@ -69,13 +69,13 @@ COUNTERS = (
 
 
 def trial_signals(joints: int, support: int) -> dict[str, int]:
-    """The signals that only planned episodes have, with their sizes; so many joints, and support joints among them."""
+    """Signals only of planned episodes, with sizes; `joints`, `support`: numbers of all and of support joints."""
     return TRIAL_SIGNALS | dict.fromkeys(JOINT_SIGNALS, joints) | {ACTION_SIGNAL: support}
 
 
 def buffer_fields(observation: int, action: int, terms: int, extra: Mapping[str, int]) -> Fields:
-    """Everything that passes between a batch and its parent; `terms`: number of the reward's; `extra`: signals beside
-    the usual ones, with sizes."""
+    """Arrays exchanged between a batch and its parent; `terms`: number of reward terms; `extra`: additional signals,
+    with sizes."""
     return {
         "action": ((action,), "float32"),
         "observation": ((observation,), "float32"),

@@ -1,4 +1,4 @@
-"""From the counters of the environments to the figures of a stretch of training."""
+"""Training statistics computed from the counters of the environments."""
 
 from collections.abc import Sequence
 
@@ -13,28 +13,28 @@ EPISODIC = (
     *(f"terminations/{reason}" for reason in REASONS),
     *(f"falls/{cause}" for cause in CAUSES),
 )
-"""Figures of episodes that ended; where none did, the last value is carried on."""
+"""Statistics of finished episodes; if none finished, the last values are kept."""
 
 
 class Statistics:
-    """Figures since they were last read; all of them are always there, and finite."""
+    """Statistics since the last read; always complete and finite."""
 
     def __init__(self, period: float, scenes: Sequence[str], terms: Sequence[str]) -> None:
-        """`period`: control period [s]; `scenes`: name of each environment's; `terms`: names of the reward's."""
+        """`period`: control period [s]; `scenes`: scene of each environment; `terms`: names of the reward terms."""
         self._period, self._terms = period, tuple(terms)
         names = np.array(scenes)
         self._scenes = {name: names == name for name in dict.fromkeys(scenes)}
         self._kept = len(EPISODIC)
         self._errors = [f"error/{s}/{kind}/{error}" for s in self._scenes for kind in KINDS for error in ERRORS]
         self.carried = np.zeros(self._kept + len(self._errors))
-        """The last values of what not every stretch has: `EPISODIC`, and the errors."""
+        """Last values of `EPISODIC` and the errors, kept for intervals without data."""
 
     def read(self, counters: Array, terms: Array, levels: Array) -> dict[str, float]:
-        """Figures from counters (n, len(COUNTERS)), sums of the reward's terms (n, terms) and levels (n, axes);
-        sets counters and sums back.
+        """Statistics from counters (n, len(COUNTERS)), sums of reward terms (n, terms) and levels (n, axes); resets
+        counters and sums to zero.
 
-        Rewards are means per second, terminations and falls parts of the episodes that ended, divergences a number,
-        errors means of absolute values by scene and by what the command asks for.
+        Rewards are means per second, terminations and falls fractions of the episodes that ended, divergences a count,
+        errors means of absolute values by scene and kind of command.
         """
         total = dict(zip(COUNTERS, counters.sum(axis=0).tolist(), strict=True))
         rewards = dict(

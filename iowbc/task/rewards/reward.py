@@ -12,7 +12,7 @@ from iowbc.task.own_function import load_function
 from iowbc.task.rewards.table import ONCE, TERMS, TRACKED, Step, Term
 
 CONTRACT = "it takes a Step (iowbc/task/rewards/table.py) and returns a finite number for each environment, shape (n,)"
-"""What a term in a user's file has to be."""
+"""Contract of a user-defined term."""
 
 
 @dataclass(frozen=True)
@@ -29,18 +29,18 @@ class Scored:
 
 @dataclass(frozen=True)
 class WeightedTerm:
-    """A term as a recipe wants it."""
+    """A term with its weight and kernel width."""
 
     column: int
-    """Its place among all."""
+    """Its index among all terms."""
     function: Term
     weight: float
-    """Reward of a control step at the value 1."""
+    """Reward per control step for the value 1."""
     width: float | None
-    """Of its kernel; none where the value counts as it is."""
+    """Width of its kernel; None without a kernel."""
 
     def value(self, step: Step) -> Array:
-        """What is weighted, (n,)."""
+        """Value before weighting, (n,)."""
         value: Array = np.asarray(self.function(step))
         if self.width is not None:
             value = kernel(value, self.width)
@@ -48,18 +48,18 @@ class WeightedTerm:
 
 
 def term_names(recipe: Reward) -> tuple[str, ...]:
-    """Names of all terms: those of the table by dotted path, then those of the recipe's own that have a weight."""
+    """Names of all terms: those of the table by dotted path, then user-defined ones that have a weight."""
     return (*TERMS, *(f"own.{name}" for name in recipe.own_terms))
 
 
 class RewardFunction:
-    """The reward of a recipe. Terms without a weight are not computed, unless they say how well it tracks."""
+    """The reward of a recipe. Terms without a weight, now or later, are computed only if they are in `TRACKED`."""
 
     def __init__(
         self, recipe: Reward, period: float, terms: Mapping[str, Term] | None = None, *, own: bool = False
     ) -> None:
         """`period`: control period [s]; `terms`: by dotted path in the recipe, by default those of the table; `own`:
-        execute the recipe's own terms, which else count nothing. Raises StageFailed for one that cannot be used."""
+        execute the user-defined terms, which are zero otherwise. Raises StageFailed for one that cannot be used."""
         table = TERMS if terms is None else terms
         self._columns = len(table) + len(recipe.own_terms)
         seconds = {path: 1.0 if path in ONCE else period for path in table}
@@ -86,8 +86,8 @@ class RewardFunction:
                 self._terms.append(changed)
 
     def __call__(self, step: Step, diverged: Mask, level: Array) -> Scored:
-        """Reward of one control step at levels of locomotion (n,). What diverged, (n,), cannot be judged: it costs like
-        a fall, and no more."""
+        """Reward of one control step at levels of locomotion (n,). `diverged` environments, (n,), get the penalty of a
+        fall and no other term."""
         terms = np.zeros((len(step.command), self._columns))
         for term in self._terms:
             terms[:, term.column] = term.value(step)
@@ -115,8 +115,8 @@ def kernel(squared_error: Array, width: float | Array) -> Array:
 
 
 def load_terms(recipe: Reward) -> dict[str, Callable[[Step], Array]]:
-    """The recipe's own terms that have a weight, by name: training environments execute their file, and nothing else
-    does. Raises StageFailed for one that cannot be used."""
+    """User-defined terms that have a weight, by name; only training environments execute their file. Raises StageFailed
+    for one that cannot be used."""
     return {name: _own_term(name, term) for name, term in recipe.own_terms.items()}
 
 

@@ -21,7 +21,7 @@ from iowbc.task.rewards.terms import squared_norm
 
 @dataclass(frozen=True)
 class Step:
-    """What the terms may look at after a control step of n environments."""
+    """Inputs of the terms after a control step of n environments."""
 
     state: SimulationState
     motion: Motion
@@ -33,9 +33,9 @@ class Step:
     command: Array
     """C in force during the step, (n, 11)."""
     target_velocity: Array
-    """Planar velocity asked for: the command's, changed by the force to which the robot yields, (n, 2) [m/s]."""
+    """Planar target velocity: the command's, changed by the force to which the robot yields, (n, 2) [m/s]."""
     unyielded_force: Array
-    """Horizontal force on the hands at which the robot should have yielded altogether, and beyond, (n,) [N]."""
+    """Horizontal excess force on the hands to which the robot cannot yield, (n,) [N]; see `Admittance.unyielded`."""
     height_rate: Array
     """Rate of change of the commanded height, (n,) [m/s]."""
     support_reference: Array
@@ -51,7 +51,7 @@ class Step:
     earlier_action: Array
     """a_{t−2}, (n, 15)."""
     swing_profile: Array
-    """Height at which the gait prior has the soles, (n, 2) [m]."""
+    """Sole heights of the gait prior, (n, 2) [m]."""
     stepping: Mask
     """Whether the gait clock runs, (n,)."""
     commanded: Mask
@@ -61,11 +61,11 @@ class Step:
     held: Mask
     """Environments that hold an object, (n,)."""
     pushed: Mask
-    """Environments with an object that hands push, (n,)."""
+    """Environments with an object to push, (n,)."""
     object_place: Array
-    """Where a held object belongs, in a push the middle of the hands; from the base, heading frame, (n, 3) [m]."""
+    """Target position of a held object, in a push the middle of the hands; from the base, heading frame, (n, 3) [m]."""
     ended: Mask
-    """Environments that fell or dropped the object in this step, (n,)."""
+    """Environments that fell, lost the object or lagged too far behind the command in this step, (n,)."""
 
     @property
     def support_error(self) -> Array:
@@ -116,8 +116,8 @@ TERMS: dict[str, Term] = {
     "alive": lambda s: np.ones(len(s.command)),
     "termination": lambda s: s.ended,
 }
-"""The terms; each counts once a second, times its weight."""
+"""The terms; their weights are rewards per second."""
 ONCE = ("termination",)
-"""Terms that count once when they are due, and not by the second."""
+"""Terms whose weights are rewards per event instead."""
 TRACKED = ("sync.height", "sync.torso_pitch")
-"""Terms with a kernel whose scores say how well an environment keeps its posture."""
+"""Terms with a kernel whose scores measure how well the posture is tracked."""

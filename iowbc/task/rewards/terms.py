@@ -8,7 +8,7 @@ from iowbc.arrays import Array, Mask
 SLOW = 1e-6
 """Keeps a command to stand from dividing by zero [m/s]."""
 LEAST_LIMIT = 1.0
-"""Torque limit that a motor at its no-load speed counts as having [N·m]; there it has none."""
+"""Lower bound of a motor's torque limit, which is zero at its no-load speed [N·m]."""
 LEAST_LOAD = 1.0
 """Force on both feet under which slipping fades out [N]."""
 
@@ -20,7 +20,7 @@ def squared_norm(values: Array) -> Array:
 
 
 def progress(velocity: Array, command: Array) -> Array:
-    """v_sys along the commanded velocity, no more than commanded, (n,) [m/s]; (n, 2), heading frame. Zero without one.
+    """v_sys along the commanded velocity, clipped to ± its size, (n,) [m/s]; (n, 2), heading frame. Zero without one.
 
     Its slope is the same wherever the robot is too slow, unlike that of a kernel, which is flat far from the command.
     """
@@ -30,7 +30,7 @@ def progress(velocity: Array, command: Array) -> Array:
 
 
 def turning(rate: Array, command: Array) -> Array:
-    """Yaw rate towards the commanded one, no more than commanded, (n,) [rad/s]."""
+    """Yaw rate in the commanded direction, clipped to ± the commanded size, (n,) [rad/s]."""
     limit = np.abs(command)
     return (rate * np.sign(command)).clip(-limit, limit)
 
@@ -63,7 +63,7 @@ def saturation(saturated: Mask) -> Array:
 
 
 def contact_timing(contact: Mask, expected: Mask) -> Array:
-    """Mean over the feet of +1 where contact is as the phase asks and −1 where not, (n,); feet (n, 2)."""
+    """Mean over the feet of +1 where contact agrees with the phase and −1 where not, (n,); feet (n, 2)."""
     return (contact == expected).sum(axis=1) * (2.0 / contact.shape[1]) - 1.0
 
 
@@ -73,8 +73,8 @@ def swing_height(sole_height: Array, profile: Array, swinging: Mask) -> Array:
 
 
 def foot_slip(foot_velocity: Array, foot_force: Array) -> Array:
-    """Horizontal speed of the soles, averaged by the weight that each bears, (n,) [m/s]; velocities and forces
-    (n, 2, 3), in m/s and N. Zero in the air."""
+    """Load-weighted mean of the soles' horizontal speeds, (n,) [m/s]; velocities and forces (n, 2, 3), in m/s and N.
+    Zero in the air."""
     load = np.maximum(foot_force[:, :, 2], 0.0)
     speed = np.sqrt(np.vecdot(foot_velocity[:, :, :2], foot_velocity[:, :, :2]))
     return np.vecdot(speed, load) / np.maximum(load.sum(axis=1), LEAST_LOAD)

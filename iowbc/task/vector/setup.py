@@ -1,4 +1,4 @@
-"""What a process needs to know to build its part of the environments."""
+"""Setup from which a process builds its part of the environments."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ class Setup:
     count: int
     seed: int
     episodes: tuple[Episode, ...] | None = None
-    """What each environment plays; without, episodes are drawn as in training."""
+    """Episode of each environment; None draws episodes as in training."""
     divergences: Path | None = None
     """Folder in which diverged simulations are kept for replay."""
 
@@ -42,7 +42,7 @@ class Setup:
         return scene_of(self.count, self.specification.recipe.task.scenes)
 
     def buffer_fields(self) -> Fields:
-        """What passes between the environments and the learner."""
+        """Arrays exchanged between the environments and the learner."""
         robot = load_robot(self.specification.robot)
         extra = {} if self.episodes is None else trial_signals(len(robot.joints), len(robot.support))
         recipe = self.specification.recipe

@@ -1,6 +1,6 @@
-"""Arrays of many environments, whichever processes step them: memory that parent and workers share, and snapshots.
+"""Arrays of many environments, independent of their processes: memory that parent and workers share, and snapshots.
 
-The memory is anonymous, so that nothing is left behind whoever dies.
+The memory is anonymous, so that nothing is left behind when a process dies.
 """
 
 import mmap
@@ -21,7 +21,7 @@ Fields = Mapping[str, tuple[tuple[int, ...], str]]
 
 @dataclass(frozen=True)
 class Buffers:
-    """What an environment batch reads and writes each step; rows are environments."""
+    """Arrays that an environment batch reads and writes in each step; rows are environments."""
 
     arrays: dict[str, NDArray[Any]]
 
@@ -38,8 +38,8 @@ def private_buffers(fields: Fields, rows: int) -> Buffers:
 
 
 def create_shared(fields: Fields, rows: int) -> tuple[int, Buffers]:
-    """Shared buffers and the file descriptor that a worker inherits. The memory has no name in the file system and
-    goes when its last holder does."""
+    """Shared buffers and the file descriptor that a worker inherits. The memory has no name in the file system and is
+    freed with its last holder."""
     descriptor = os.memfd_create("iowbc-buffers", os.MFD_CLOEXEC)
     os.ftruncate(descriptor, _place(fields, rows)[1])
     return descriptor, attach_shared(descriptor, fields, rows)

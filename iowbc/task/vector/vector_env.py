@@ -32,7 +32,7 @@ from iowbc.task.vector.workers import InProcess, WorkerProcesses, Workers
 Indices = None | int | Iterable[int]
 
 PATIENCE = 15.0
-"""How long a step may take before a worker counts as hung [s]; a step takes milliseconds."""
+"""Timeout of a step, after which a worker counts as hung [s]; a step takes milliseconds."""
 
 
 class VectorEnv(VecEnv):  # type: ignore[misc]
@@ -49,8 +49,8 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
         divergences: Path | None = None,
         patience: float = PATIENCE,
     ) -> None:
-        """`workers`: processes; 0 steps the environments in this one; or who else steps them. `episodes`: one an
-        environment, played anew after every reset. `divergences`: folder for simulations that diverged.
+        """`workers`: number of processes, 0 to step in this one, or a factory of `Workers`. `episodes`: one per
+        environment, restarted by every reset. `divergences`: folder for simulations that diverged.
 
         The rollout does not depend on `workers`. Raises WorkerFailed when a worker dies, hangs for `patience` [s] or
         raises, and StageFailed where a function in a user's file cannot be used: a part of s_priv, or a term of the
@@ -96,7 +96,7 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
         return self.workers.batch
 
     def reset(self) -> NDArray[np.float32]:
-        """Begins an episode everywhere; after `seed` with those seeds."""
+        """Starts an episode in every environment; after a call of `seed`, with those seeds."""
         seeds = None if self._seeds[0] is None else np.array(self._seeds, np.uint64)
         parts = [None if seeds is None else seeds[first:last] for first, last in self.workers.groups]
         self._call([Message.of(Batch.reset, part) for part in parts])
@@ -116,7 +116,7 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
         self.workers.ask([Message.of(Batch.step) for _ in self.workers.groups])
 
     def step_wait(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
-        """Results of the step: observations, rewards, dones, infos; ended environments have begun anew."""
+        """Results of the step: observations, rewards, dones, infos; ended environments have been reset."""
         self.workers.answers()
         buffers = self._buffers
         done = buffers["done"].copy()
@@ -126,13 +126,13 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
         return buffers["observation"].copy(), buffers["reward"].copy(), done, infos
 
     def roll(self, rollout_policy: RolloutPolicy, steps: int) -> Trajectories:
-        """Make a rollout of some control steps, each group of environments where it is: one message to each worker
-        and one back. What comes of it does not depend on the workers."""
+        """Runs a rollout of some control steps in the workers, with one message to each and one back. The result does
+        not depend on the number of workers."""
         messages = [Message.of(roll, rollout_policy.part(*group), steps) for group in self.workers.groups]
         return side_by_side(self._call(messages))
 
     def _ending(self, index: int) -> dict[str, Any]:
-        """What stable-baselines3 wants to know of an episode's end, and why it ended."""
+        """Info of an episode's end for stable-baselines3, with the reason."""
         buffers, truncated = self._buffers, bool(self._buffers["truncated"][index])
         reason = "time_limit" if truncated else next(r for r in REASONS if r in SIGNALS and self.signals[r][index, 0])
         return {
@@ -147,7 +147,7 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
         }
 
     def statistics(self) -> dict[str, float]:
-        """Figures since the last call; see `Statistics`."""
+        """Statistics since the last call; see `Statistics`."""
         return self._statistics.read(self._buffers["counters"], self._buffers["terms"], self._levels())
 
     def drawn(self) -> dict[str, Array]:
@@ -155,7 +155,7 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
         return join(self._read(Batch.drawn))
 
     def curriculum(self) -> dict[str, Any]:
-        """How far the curriculum is, for JSON: the levels of each axis in each scene, ascending."""
+        """State of the curriculum for JSON: the levels of each axis in each scene, ascending."""
         levels, scenes = self._levels(), np.array(self._scenes)
         return {
             "levels": {
@@ -177,11 +177,11 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
         self._set_levels(levels)
 
     def state(self) -> dict[str, Array]:
-        """Everything that the future depends on; the same however many workers there are."""
+        """Complete state; independent of the number of workers."""
         return join(self._read(Batch.snapshot)) | {"statistics": self._statistics.carried.copy()}
 
     def restore(self, state: Mapping[str, Array]) -> None:
-        """Inverse of `state`: the environments then take bit for bit the same course."""
+        """Inverse of `state`: the environments then continue bit for bit."""
         own = dict(state)
         self._statistics.carried[:] = own.pop("statistics")
         parts = split(own, [self._scenes[first:last] for first, last in self.workers.groups])
@@ -242,7 +242,7 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
         return np.concatenate(self._read(Batch.levels))
 
     def _read(self, method: Callable[[Batch], Any]) -> list[Any]:
-        """What a method of each group's environments answers, which leaves them as they are."""
+        """Results of a read-only method of each group of environments."""
         return self._call([Message(method, changes=False) for _ in self.workers.groups])
 
     def _call(self, messages: Sequence[Message]) -> list[Any]:

@@ -17,8 +17,8 @@ from iowbc.errors import IowbcError
 from iowbc.processes import die_with_parent
 
 ASKED = "import json, sys; sys.path[:] = json.loads(sys.argv.pop(1)); from iowbc.task.vector.worker import main; main()"
-"""With this Python becomes a worker. Its arguments are the parent's module path, as JSON, and its process number;
-whether to die with the thread that started the worker; and the descriptors of pipe, shared memory and log."""
+"""Python program of a worker process. Its arguments are the parent's module path, as JSON, and its process id; whether
+to die with the thread that started the worker; and the descriptors of pipe, shared memory and log."""
 
 
 Given = ParamSpec("Given")
@@ -32,7 +32,7 @@ class Message:
     arguments: tuple[Any, ...] = ()
     named: Mapping[str, Any] = field(default_factory=dict)
     changes: bool = True
-    """Whether the environments' future depends on it."""
+    """Whether the call changes the environments' state."""
 
     @classmethod
     def of(cls, method: Callable[Concatenate[Any, Given], Any], *arguments: Given.args, **named: Given.kwargs) -> Self:
@@ -40,7 +40,7 @@ class Message:
         return cls(method, arguments, named)
 
     def carry_out(self, batch: Any) -> Any:
-        """The answer of the group's environments."""
+        """Executes the call for a group of environments."""
         return self.method(batch, *self.arguments, **self.named)
 
 
@@ -72,7 +72,7 @@ def _serve(connection: Connection, memory: int) -> None:
 
         setup, first, last = connection.recv()
         batch = setup.batch(first, last, attach_shared(memory, setup.buffer_fields(), setup.count).rows(first, last))
-        gc.freeze()  # what lives as long as the process need not be looked through at every collection
+        gc.freeze()  # permanent objects need not be scanned at every collection
         connection.send((True, None))
         while True:
             message: Message = connection.recv()

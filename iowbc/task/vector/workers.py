@@ -1,4 +1,4 @@
-"""The parent's end of the worker processes: starts them, asks them, notices when one dies or hangs, and ends them."""
+"""Parent side of the worker processes: starts them, sends requests, detects crashes and hangs, and stops them."""
 
 import json
 import os
@@ -24,15 +24,15 @@ from iowbc.task.vector.shared import Buffers, Fields, create_shared, private_buf
 from iowbc.task.vector.worker import ASKED, Message
 
 STARTING = 300.0
-"""How long workers may take to build their environments [s]."""
+"""Timeout for building the environments [s]."""
 LEAVING = 2.0
-"""How long workers may take to leave by themselves [s]."""
+"""Time for workers to exit by themselves [s]."""
 SLICE = 0.5
-"""Patience is counted in waits of this length [s], so that a suspended machine does not use it up."""
+"""Timeouts are counted in waits of this length [s], so that a suspended machine does not use them up."""
 STEPS = COUNTERS.index("steps")
 """Column of the counters that shows a worker's progress."""
 DUMPING = 0.5
-"""Time that a hung worker gets to write down where it is [s]."""
+"""Time for a hung worker to write its traceback [s]."""
 
 
 class Workers(Protocol):
@@ -41,27 +41,27 @@ class Workers(Protocol):
     groups: list[tuple[int, int]]
     """First and last environment (excluded) of each group."""
     buffers: Buffers
-    """What all environments read and write."""
+    """Arrays that all environments read and write."""
 
     def ask(self, messages: Sequence[Message]) -> None:
         """Sends each group its message, in their order."""
 
     def answers(self) -> list[Any]:
-        """What the groups answered, in their order."""
+        """Replies of the groups, in their order."""
 
     def close(self) -> None:
-        """Ends it all."""
+        """Stops the workers."""
 
 
 class Building(Protocol):
-    """What a process needs to know to build its part of some environments; `Setup` is one."""
+    """Interface of a setup from which a process builds its environments, such as `Setup`."""
 
     @property
     def count(self) -> int:
         """Number of environments."""
 
     def buffer_fields(self) -> Fields:
-        """What passes between the environments and the parent, with the counters of steps."""
+        """Arrays exchanged between the environments and the parent, with the counters of steps."""
 
     def batch(self, first: int, last: int, buffers: Buffers) -> Any:
         """The environments from `first` to `last`, the latter excluded."""
@@ -94,7 +94,7 @@ class WorkerProcess:
     popen: subprocess.Popen[bytes]
     connection: Connection
     log: int
-    """File descriptor to which the worker writes where it is when it crashes or hangs."""
+    """File descriptor to which the worker writes its traceback when it crashes or hangs."""
 
 
 class WorkerProcesses:
@@ -133,7 +133,7 @@ class WorkerProcesses:
         return [process.popen.pid for process in self._processes]
 
     def ask(self, messages: Sequence[Message]) -> None:
-        """See `Workers`. Answers that an interruption left lying are thrown away first."""
+        """See `Workers`. Replies left over from an interruption are discarded first."""
         if not self._ended.alive:
             raise WorkerFailed("the worker processes have ended; make a new vector environment")
         self._wait(self._patience)
@@ -155,7 +155,7 @@ class WorkerProcesses:
         self._ended()
 
     def _wait(self, patience: float) -> None:
-        """Until all have answered. One that is at a rollout has `patience` for each step."""
+        """Waits for all replies. Every step of a rollout restarts the timeout `patience`."""
         left, steps = patience, self._steps()
         while self._asked:
             ready = {self._pipes[pipe] for pipe, _ in self._poll.poll(1e3 * SLICE)}
@@ -167,7 +167,7 @@ class WorkerProcesses:
                 self._fail(min(self._asked), hung=patience)
 
     def _steps(self) -> float:
-        """Control steps that the environments of those who are asked have made since they were last counted."""
+        """Sum of the step counters of the busy workers' environments."""
         rows = [slice(*self.groups[index]) for index in self._asked]
         return float(sum(self.buffers["counters"][row, STEPS].sum() for row in rows))
 
@@ -199,7 +199,7 @@ class WorkerProcesses:
 
 
 def _start(memory: int) -> WorkerProcess:
-    """A new worker process; signals to stop are blocked from its first moment, for the parent decides the end."""
+    """Starts a worker process. Signals to stop are blocked from its start, because the parent stops it."""
     ours, theirs = socket.socketpair()
     log = os.memfd_create("iowbc-worker-log", os.MFD_CLOEXEC)
     bound = threading.current_thread() is threading.main_thread()
@@ -221,7 +221,7 @@ def _start(memory: int) -> WorkerProcess:
 
 
 def _end_of(popen: subprocess.Popen[bytes]) -> str:
-    """How a worker ended that does not answer any more."""
+    """Description of how an unresponsive worker ended."""
     try:
         status = popen.wait(LEAVING)
     except subprocess.TimeoutExpired:
