@@ -1,1 +1,1 @@
-"""Controllers that others trained: their own configuration, and how they take part in the trials."""
+"""Adapters for third-party controllers: their configuration, and their use as policies in the trials."""

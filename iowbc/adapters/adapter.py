@@ -1,4 +1,4 @@
-"""The description of a controller that others trained: joints, gains, observation, action and network."""
+"""Description of a third-party controller: joints, gains, observation, action and network."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -14,18 +14,18 @@ VELOCITIES = ("v_x", "v_y", "yaw_rate")
 
 @dataclass(frozen=True)
 class Seen:
-    """Command and measurements of n robots, a row each. Joints are those of the adapter, in its order."""
+    """Command and measurements of n robots, one row each. Joints are in the adapter's order."""
 
     velocity: Array
-    """Commanded v_x, v_y [m/s] and yaw rate [rad/s], heading frame, kept to the adapter's ranges, (n, 3)."""
+    """Commanded v_x, v_y [m/s] and yaw rate [rad/s], heading frame, clipped to the adapter's ranges, (n, 3)."""
     height: Array
     """Commanded height of the pelvis, (n, 1) [m]."""
     pitch: Array
     """Commanded torso pitch, (n, 1) [rad]."""
     walking: Mask
-    """Whether the commanded velocity asks for steps, (n,)."""
+    """True if the commanded velocity requires stepping, (n,)."""
     walked: Array
-    """Time since it began to, (n, 1) [s]; 0 in standing."""
+    """Time since walking began, (n, 1) [s]; 0 in standing."""
     gravity: Array
     """Direction of gravity in the base frame, (n, 3)."""
     angular_velocity: Array
@@ -37,7 +37,7 @@ class Seen:
     joint_velocity: Array
     """(n, joints) [rad/s]."""
     action: Array
-    """Output of the network in the step before, zero at first, (n, acted)."""
+    """Network output of the previous step, initially zero, (n, acted)."""
 
 
 Term = Callable[[Seen], Array]
@@ -45,50 +45,51 @@ Term = Callable[[Seen], Array]
 
 
 def scaled(name: str, factor: float | Array = 1.0) -> Term:
-    """The part of the observation that is a field of `Seen` times a factor."""
+    """Observation term: a field of `Seen` times a factor."""
     return lambda seen: getattr(seen, name) * factor
 
 
 @dataclass(frozen=True)
 class Adapter:
-    """A controller as its own configuration describes it."""
+    """Description of a controller, from its own configuration."""
 
     joints: tuple[str, ...]
-    """Joints that it observes, in its order."""
+    """Observed joints, in the controller's order."""
     default: Array
-    """Posture to which observation and action refer, (joints,) [rad]."""
+    """Reference posture of observation and action, (joints,) [rad]."""
     kp: Array
     """Position gains, (joints,) [N·m/rad]."""
     kd: Array
     """Velocity gains, (joints,) [N·m·s/rad]."""
     acted: tuple[str, ...]
-    """Joints of its action, in its order: legs and waist at least. Arm joints follow theirs where `eval.public.arms` is
-    `own` or `free`, which need all of them; elsewhere they hold the grasp by this project's inverse kinematics."""
+    """Joints of the action, in the controller's order: at least legs and waist. Its arm targets are used if
+    `eval.public.arms` is `own` or `free`, which require all arm joints; otherwise the arms hold the grasp by this
+    project's inverse kinematics."""
     scale: Array
-    """Radians of joint target for each unit of action, (acted,)."""
+    """Change of joint target per unit of action, (acted,) [rad]."""
     frequency: float
-    """Rate at which it acts [Hz]."""
+    """Control rate [Hz]."""
     terms: tuple[Term, ...]
-    """Parts of its observation, in order."""
+    """Terms of the observation, in order."""
     network: Callable[[Array], Array]
     """Action (1, acted) from an observation (1, size), float32."""
     history: int = 1
-    """Observations that it sees, the last one included; the first fills the history."""
+    """Number of observations in the input, including the newest. The first of an episode fills the history."""
     by_term: bool = True
-    """Whether all past values of a part stand together, oldest first, rather than all parts of a past observation."""
+    """True: all past values of a term are adjacent, oldest first. False: all terms of a past observation are."""
     ranges: Mapping[str, tuple[float, float]] | None = None
-    """Ranges of the commanded v_x, v_y [m/s] and yaw_rate [rad/s]; empty bounds none."""
+    """Ranges of the commanded v_x, v_y [m/s] and yaw_rate [rad/s]; a missing entry is unbounded."""
     standing: float = 0.01
     """Commanded planar speed [m/s] and yaw rate [rad/s] up to which the robot stands."""
 
     def bounds(self) -> tuple[Array, Array]:
-        """Least and greatest commanded velocities, (3,) each."""
+        """Minimum and maximum commanded velocities, (3,) each."""
         known = self.ranges or {}
         low, high = zip(*(known.get(name, (-np.inf, np.inf)) for name in VELOCITIES), strict=True)
         return np.array(low), np.array(high)
 
     def observed(self, past: tuple[Array, ...]) -> Array:
-        """The network's input (n, size) from the last values of each part, (n, history, size of the part) each."""
+        """Network input, (n, size), from the last values of each term, (n, history, size of the term) each."""
         rows = len(past[0])
         if self.by_term:
             return np.concatenate([values.reshape(rows, -1) for values in past], axis=1)
@@ -96,10 +97,10 @@ class Adapter:
 
 
 def require_fitting(adapter: Adapter, robot: Robot, frequency: float, where: str, *, moves_arms: bool = False) -> None:
-    """Holds an adapter against a robot and the rate of control [Hz], and its network against its observation.
+    """Check an adapter against a robot and a control rate [Hz], and its network against its observation.
     `moves_arms`: the controller acts on all arm joints, too.
 
-    Raises StageFailed with the field, what it is and what would be valid.
+    Raises StageFailed with the field, its value and the valid values.
     """
     problems = [
         *_naming(adapter, robot, moves_arms),
@@ -140,7 +141,7 @@ def _naming(adapter: Adapter, robot: Robot, moves_arms: bool) -> list[str]:
 
 
 def _require_answer(adapter: Adapter, where: str) -> None:
-    """One step of a robot that stands in the default posture."""
+    """Check the network's output for a robot that stands in the default posture."""
     try:
         parts = [np.asarray(term(standing(adapter)), np.float64)[:, None] for term in adapter.terms]
         past = tuple(np.repeat(values, adapter.history, 1) for values in parts)

@@ -1,4 +1,4 @@
-"""Controllers with a `deploy.yaml`, which unitree_rl_lab and its relatives write beside the networks they export."""
+"""Controllers with a `deploy.yaml`, which unitree_rl_lab and related projects write beside exported networks."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -15,7 +15,7 @@ from iowbc.files import read_limited
 
 CONFIGURATION = "deploy.yaml"
 LARGEST = 1 << 20
-"""Bytes of a configuration at most."""
+"""Maximum size of a configuration file [bytes]."""
 LEG = ("hip_pitch", "hip_roll", "hip_yaw", "knee", "ankle_pitch", "ankle_roll")
 ARM = ("shoulder_pitch", "shoulder_roll", "shoulder_yaw", "elbow", "wrist_roll", "wrist_pitch", "wrist_yaw")
 MOTORS = (
@@ -23,7 +23,7 @@ MOTORS = (
     *(f"waist_{part}_joint" for part in ("yaw", "roll", "pitch")),
     *(f"{side}_{part}_joint" for side in ("left", "right") for part in ARM),
 )
-"""The G1's 29 joints in the order of its motors."""
+"""The G1's 29 joints in motor order."""
 FIELDS = {
     "base_ang_vel": "angular_velocity",
     "projected_gravity": "gravity",
@@ -34,12 +34,12 @@ FIELDS = {
     "joint_vel_rel": "joint_velocity",
     "last_action": "action",
 }
-"""Observation terms that are read, and what they are here."""
+"""Supported observation terms and the corresponding fields of `Seen`."""
 RANGES = {"v_x": "lin_vel_x", "v_y": "lin_vel_y", "yaw_rate": "ang_vel_z"}
 
 
 class _Loader(yaml.SafeLoader):
-    """Plain YAML; what the exporter writes as a Python `slice` is read as nothing: all joints."""
+    """Safe YAML loader that reads the exporter's Python `slice` objects as None, meaning all joints."""
 
 
 _Loader.add_constructor("tag:yaml.org,2002:python/object/apply:builtins.slice", lambda loader, node: None)
@@ -85,7 +85,7 @@ def _described(said: Mapping[str, Any], policy: Path) -> Adapter:
 
 
 def _term(name: str, said: Mapping[str, Any]) -> Term:
-    """A part of the observation, clipped and then scaled."""
+    """Observation term, clipped and then scaled."""
     if name not in FIELDS or said.get("params", {}).get("asset_cfg"):
         raise ValueError(f"the observation {name!r} is not read; there are: {', '.join(FIELDS)}")
     factor: Array = np.array(1.0 if said.get("scale") is None else said["scale"], np.float64)
@@ -96,7 +96,7 @@ def _term(name: str, said: Mapping[str, Any]) -> Term:
 
 
 def _only(folder: Path, pattern: str) -> Path:
-    """The one file of a pattern in a folder. Raises StageFailed."""
+    """The only file in a folder that matches a pattern. Raises StageFailed if there is none or more than one."""
     found = sorted(folder.rglob(pattern)) if folder.is_dir() else []
     if len(found) != 1:
         names = ", ".join(str(path) for path in found) or "none"

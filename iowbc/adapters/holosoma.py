@@ -1,7 +1,7 @@
-"""The walkers of the package `holosoma-inference` (Apache-2.0): 29 joints, a gait clock of two phases.
+"""Walking policies of the package `holosoma-inference` (Apache-2.0): 29 joints, gait clock with two phases.
 
-Joints, gains and ranges are in the metadata of the ONNX file, the other numbers in the package's configuration of
-locomotion with the G1.
+Joints, gains and ranges are in the metadata of the ONNX file, the other numbers in the package's locomotion
+configuration for the G1.
 """
 
 from pathlib import Path
@@ -24,7 +24,7 @@ DEFAULT = {
     "right_shoulder_roll": -0.2,
     "elbow": 0.6,
 }
-"""Joints of the default posture that are not at zero, on both sides where none is named [rad]."""
+"""Nonzero joint angles of the default posture, for both sides if no side is named [rad]."""
 ACTION_SCALE = 0.25
 FREQUENCY = 50.0
 GAIT_PERIOD = 1.0
@@ -34,7 +34,7 @@ LARGEST_ACTION = 100.0
 
 
 def adapter(policy: Path) -> Adapter:
-    """The adapter of an ONNX file of the package. Raises StageFailed where its metadata lacks something."""
+    """The adapter of an ONNX file of the package. Raises StageFailed if metadata entries are missing."""
     said, run = metadata(policy), network(policy)
     missing = [name for name in ("dof_names", "kp", "kd", "command_ranges") if name not in said]
     if missing:

@@ -1,4 +1,4 @@
-"""Networks of others: ONNX on onnxruntime, TorchScript on torch, one thread each."""
+"""Third-party networks: ONNX on onnxruntime, TorchScript on torch, one thread each."""
 
 import json
 from collections.abc import Callable, Mapping
@@ -11,11 +11,11 @@ from iowbc.arrays import Array
 from iowbc.errors import StageFailed
 
 TORCHSCRIPT = (".pt", ".pth", ".jit", ".ts")
-"""Endings of files that hold TorchScript; pickled weights are not read."""
+"""Suffixes of TorchScript files; pickled weights are not supported."""
 
 
 def network(path: Path) -> Callable[..., Array]:
-    """The function of a network: its first output from its inputs, float32 arrays. Raises StageFailed."""
+    """Load a network as a function from its inputs to its first output, float32 arrays. Raises StageFailed."""
     try:
         if path.suffix == ".onnx":
             return _onnx(path)
@@ -27,7 +27,7 @@ def network(path: Path) -> Callable[..., Array]:
 
 
 def metadata(path: Path) -> Mapping[str, Any]:
-    """Metadata of an ONNX file, values that are JSON decoded. Raises StageFailed."""
+    """Metadata of an ONNX file, with values decoded from JSON. Raises StageFailed."""
     try:
         said = _session(path).get_modelmeta().custom_metadata_map
         return {name: json.loads(value) for name, value in said.items()}

@@ -1,4 +1,4 @@
-"""A public controller as a policy of the trials: its observation from s_t, its joint targets as the residual action."""
+"""Public controllers as policies in the trials: observation from s_t, joint targets as residual action."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,11 +15,11 @@ from iowbc.robot.description import Robot
 
 
 class AdaptedPolicy:
-    """Acts in n environments, each on its own: the same action whichever others there are.
+    """Policy that acts in n environments, evaluated separately: other environments do not affect an action.
 
-    The sensors are those of the learnt policies, with their noise and latency. With q_d the adapter's default posture,
-    the target of a joint is q_d + scale · output, so that the action is (target - θ_S_ref) / own scale. Targets of arms
-    that the controller moves follow it [rad].
+    Sensors, with noise and latency, are those of the learnt policies. With q_d the adapter's default posture, the
+    target of a joint is q_d + scale · output and the action (target - θ_S_ref) / action scale of the task. If the
+    controller moves the arms, their targets follow [rad].
     """
 
     def __init__(self, controller: PublicController, adapter: Adapter, robot: Robot, task: Task) -> None:
@@ -44,16 +44,16 @@ class AdaptedPolicy:
         self._past: tuple[Array, ...] = ()
 
     def reset(self, which: NDArray[np.bool_]) -> None:
-        """Forget the past of the marked environments, shape (n,)."""
+        """Clear the history of the marked environments, shape (n,)."""
         if self._starts.shape != which.shape:
             self._blank(len(which))
         self._starts |= which
 
     def act(self, observation: NDArray[np.float32], privileged: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Residual action, shape (n, A), from s_t, shape (n, S), and the targets of arms that the controller moves,
-        (n, A + arm joints). Rows of zeros, which no trial fills, stay zero.
+        """Residual action, shape (n, A), from s_t, shape (n, S); with arm targets, shape (n, A + arm joints), if the
+        controller moves the arms. The action of an unused row (s_t all zeros) is zero.
 
-        Raises StageFailed where the network's output is not finite.
+        Raises StageFailed if the network's output is not finite.
         """
         del privileged
         rows = observation.astype(np.float64)
@@ -105,7 +105,7 @@ class AdaptedPolicy:
         )
 
     def _remember(self, seen: Seen) -> None:
-        """Put the newest observation at the end of the history; the first of an episode fills it."""
+        """Append the newest observation to the history; the first of an episode fills it."""
         newest = [np.asarray(term(seen), np.float64)[:, None] for term in self.adapter.terms]
         if not self._past:
             self._past = tuple(np.repeat(values, self.adapter.history, 1) for values in newest)

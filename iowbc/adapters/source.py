@@ -1,4 +1,4 @@
-"""From what a recipe says of a public controller to its adapter (file, digest, module) and to the robot it expects."""
+"""Adapter of a recipe's public controller (file, digest, module), and the robot description it requires."""
 
 import atexit
 import functools
@@ -27,9 +27,9 @@ CONTRACT = "it takes the controller's pathlib.Path and returns an iowbc.adapters
 
 
 def load_adapter(controller: PublicController) -> Adapter:
-    """The adapter of a public controller whose file is the one of the digest.
+    """The adapter of a public controller, after a check of its file's digest.
 
-    Raises StageFailed where the file or its package is not there, is another one, or cannot be described.
+    Raises StageFailed if the file or its package is missing, the digest differs, or no adapter can be made.
     """
     policy = policy_path(controller.policy)
     found = policy_digest(policy)
@@ -51,18 +51,18 @@ def load_adapter(controller: PublicController) -> Adapter:
 
 
 def adapted_robot(controller: PublicController, robot: Robot, task: Task) -> Path:
-    """A folder with the robot that has the controller's gains and default posture. Raises StageFailed where the
-    controller cannot be used, or does not fit the robot."""
+    """Folder with a robot description that has the controller's gains and default posture. Raises StageFailed if the
+    controller cannot be used or does not fit the robot."""
     adapter = load_adapter(controller)
     require_fitting(adapter, robot, task.control_frequency, PLACE, moves_arms=controller.moves_arms)
     return robot_of(adapter, robot, PLACE, moves_arms=controller.moves_arms)
 
 
 def robot_of(adapter: Adapter, robot: Robot, where: str, *, moves_arms: bool = False) -> Path:
-    """A folder with the robot's description in which legs and waist have the controller's gains and default posture.
+    """Folder with the robot's description in which legs and waist have the controller's gains and default posture.
 
-    Arms keep theirs, or take the controller's gains where it moves them. The folder lasts as long as the process.
-    Raises StageFailed where left and right differ, for both have one row in a description.
+    Arms take the controller's gains only if it moves them. The folder is deleted when the process exits. Raises
+    StageFailed if left and right differ, since they share one row of the description.
     """
     entries = yaml.safe_load((robot.folder / DESCRIPTION).read_text(encoding="utf-8"))
     rows = entries["joints"]
@@ -108,7 +108,7 @@ def policy_path(named: str) -> Path:
 
 
 def policy_digest(path: Path) -> str:
-    """SHA-256 of a file; of a folder that of the sorted lines `DIGEST  NAME` of all files below it, hexadecimal."""
+    """SHA-256 of a file, hexadecimal; for a folder, of the sorted lines `DIGEST  NAME` of all files below it."""
     if path.is_file():
         return file_digest(path)
     files = [file for file in path.rglob("*") if file.is_file()]

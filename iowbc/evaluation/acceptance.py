@@ -29,7 +29,7 @@ from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv
 
 TINY = 1e-9
-"""No error is smaller, in its unit, where errors are compared in parts of each other."""
+"""Lower bound of an error, in its unit, as denominator of a relative difference."""
 
 GOLDEN_PARTS: tuple[dict[str, Any], ...] = (
     {},
@@ -37,9 +37,9 @@ GOLDEN_PARTS: tuple[dict[str, Any], ...] = (
     {"velocity": (-0.2, 0.0, 0.0), "height": 0.66},
     {"height": 0.66, "pitch": 0.3, "wrists": (0.03, 0.02, 0.02, 0.03, -0.02, 0.02)},
 )
-"""Commands of the equal parts of the rollout whose inputs become the golden vectors, in the terms of a segment."""
+"""Commands of the rollout that gives the golden vectors: fields of segments of equal duration."""
 RAMP = 0.5
-"""Part of each over which the command moves."""
+"""Fraction of each segment over which the command changes."""
 
 
 @dataclass(frozen=True)
@@ -50,22 +50,22 @@ class Accepted:
     survived: int
     """Trials without a fall or a drop."""
     passed: int
-    """Of these, the trials with the weight in the hands and the way covered."""
+    """Survived trials with the weight in the hands and the distance covered."""
     weight_in_hands: float
-    """Mean part of the weight that rested in the hands; NaN where nothing is held."""
+    """Mean fraction of the weight in the hands; NaN if nothing is held."""
     transport: float
-    """Mean part of the commanded way that the robot covered; NaN where none was commanded."""
+    """Mean fraction of the commanded distance that the robot covered; NaN if none was commanded."""
     errors: Array
     """Means over the trials of the paper's four errors, (4,)."""
 
     @property
     def enough(self) -> bool:
-        """True where as many trials passed as the recipe asks for."""
+        """True if at least as many trials passed as the recipe requires."""
         return self.passed >= self.asked.minimum
 
     @property
     def sentence(self) -> str:
-        """The request and its result in words."""
+        """Acceptance criterion and result in words."""
         asked, last = self.asked, sum(segment.duration for segment in self.asked.sequence)
         held = "" if np.isnan(self.weight_in_hands) else f", {self.weight_in_hands:.0%} of its weight in the hands"
         way = "" if np.isnan(self.transport) else f", {self.transport:.0%} of the way covered"
@@ -75,12 +75,12 @@ class Accepted:
         )
 
     def differs_from(self, other: "Accepted") -> float:
-        """The largest difference of an error from that of other trials, in parts of theirs."""
+        """Largest relative difference of an error from that of other trials."""
         return float(np.max(np.abs(self.errors - other.errors) / np.maximum(other.errors, TINY)))
 
 
 def acceptance_episodes(recipe: Recipe) -> list[Episode]:
-    """The trials of `export.acceptance`; without any, one that stands, unloaded, for as long as the golden vectors."""
+    """Trials of `export.acceptance`; if empty, one trial of standing without load, `export.golden_steps` long."""
     settings, commands = recipe.export, recipe.task.commands
     if not settings.acceptance:
         duration = settings.golden_steps / recipe.task.control_frequency
@@ -97,9 +97,9 @@ def acceptance_episodes(recipe: Recipe) -> list[Episode]:
 def try_out(
     world: Specification, exported: Path, interrupted: Callable[[], bool]
 ) -> tuple[ExportedPolicy, list[Accepted]]:
-    """Let the controller in the folder `exported` play the trials. Raises Interrupted when interrupted.
+    """Run the acceptance trials with the controller in the folder `exported`. Raises Interrupted when interrupted.
 
-    Returns the driver, which holds the difference of targets, and how the trials went.
+    Returns the policy, which holds the largest difference of joint targets, and the results.
     """
     episodes = acceptance_episodes(world.recipe)
     with closing(VectorEnv(world, num_envs=len(episodes), workers=0, seed=0, episodes=episodes)) as environment:
@@ -108,7 +108,7 @@ def try_out(
 
 
 def try_out_network(world: Specification, policy: Policy, interrupted: Callable[[], bool]) -> list[Accepted]:
-    """Let the policy that was exported play the same trials, as it was trained. Raises Interrupted when interrupted."""
+    """Run the acceptance trials with the original trained policy. Raises Interrupted when interrupted."""
     episodes = acceptance_episodes(world.recipe)
     return _each_judged(world, episodes, play_episodes(world, episodes, policy, workers=0, interrupted=interrupted))
 
@@ -121,7 +121,7 @@ def _each_judged(world: Specification, episodes: list[Episode], outcomes: list[O
 
 
 def judged(recipe: Recipe, robot: Robot, asked: Acceptance, trials: list[tuple[Episode, Outcome]]) -> Accepted:
-    """The trials that pass: survived, weight in the hands, object not lost, way covered."""
+    """Result of the trials. A trial passes if survived with weight in the hands, object kept and distance covered."""
     metrics = [trial_metrics(recipe, robot, episode, outcome) for episode, outcome in trials]
     survived = [outcome.survived for _, outcome in trials]
     return Accepted(
@@ -135,7 +135,7 @@ def judged(recipe: Recipe, robot: Robot, asked: Acceptance, trials: list[tuple[E
 
 
 def golden_episode(recipe: Recipe) -> Episode:
-    """An undisturbed episode without an object that lasts `export.golden_steps`."""
+    """Undisturbed episode of `export.golden_steps` steps without an object."""
     duration = recipe.export.golden_steps / recipe.task.control_frequency / len(GOLDEN_PARTS)
     sequence = [
         Segment.model_validate({"duration": duration, "ramp": RAMP * duration, **part}) for part in GOLDEN_PARTS
@@ -144,7 +144,7 @@ def golden_episode(recipe: Recipe) -> Episode:
 
 
 def golden_inputs(world: Specification, exported: Path, interrupted: Callable[[], bool]) -> list[Values]:
-    """The inputs of each control step, without the state; fewer than asked for where the robot falls.
+    """Controller inputs of each control step, without the state; fewer than `export.golden_steps` if the robot falls.
 
     Raises Interrupted.
     """

@@ -1,4 +1,4 @@
-"""The exported controller as the driver of simulated episodes: it reads the simulated sensors, not the observation."""
+"""Exported controllers as policies in simulation: they read the simulated sensors, not the observation."""
 
 from pathlib import Path
 
@@ -16,9 +16,9 @@ from iowbc.task.vector.vector_env import VectorEnv
 
 
 def exported_world(folder: Path) -> Specification:
-    """The world in which the controller of an exported folder was accepted; it needs nothing but the folder.
+    """Specification with which an exported controller was accepted, from its folder alone.
 
-    Raises ContractBroken where the folder is not what its contract says.
+    Raises ContractBroken if the folder does not match its contract.
     """
     controller = Controller.load(folder)
     said = controller.contract
@@ -36,14 +36,14 @@ def exported_world(folder: Path) -> Specification:
 
 
 class ExportedPolicy:
-    """Drives an in-process vector environment with an exported controller, and holds the two against each other.
+    """Exported controller as the policy of an in-process vector environment, with a check of its joint targets.
 
-    The environment computes its joint targets from the action by itself; `largest_difference` is how far the
-    controller's own targets ever were from them [rad]: arm kinematics, reference generator, gait clock and scaling.
+    The environment computes its own joint targets from the action. `largest_difference` is the largest deviation of
+    the controller's targets from them [rad]; it covers arm kinematics, reference generator, gait clock and scaling.
     """
 
     def __init__(self, controller: Controller, environment: VectorEnv, *, golden_steps: int = 0) -> None:
-        """`golden_steps`: how many steps of the first environment are kept as golden vectors."""
+        """`golden_steps`: number of steps of the first environment to keep as golden vectors."""
         self.controller, self.environment = controller, environment
         self.golden_steps = golden_steps
         self.inputs: list[dict[str, NDArray[np.float32]]] = []

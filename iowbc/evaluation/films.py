@@ -1,4 +1,4 @@
-"""Films of episodes: an mp4 file frame by frame, with lines of text in a corner, and trials played again."""
+"""Videos (mp4) of episodes and replayed trials, with lines of text in a corner."""
 
 import shutil
 from collections.abc import Callable, Iterator, Sequence
@@ -28,13 +28,13 @@ from iowbc.task.vector.vector_env import VectorEnv
 Frame = NDArray[np.uint8]
 
 QUALITY = 7
-"""Of imageio-ffmpeg, 0 to 10; 20 s of 640 x 480 take about 2 MB."""
+"""Quality setting of imageio-ffmpeg, 0 to 10; 20 s of 640 x 480 take about 2 MB."""
 LINES_PER_FRAME = 26
-"""Height of the text: this many lines would fill the frame."""
+"""Frame height divided by text height."""
 UNSEEN = ("robustness", "pushes", "impedance", "map")
-"""Kinds of trials that look like others, and are not filmed."""
+"""Kinds of trials that are not filmed, since they look like others."""
 SMALL = Video(width=480, height=368, fps=10)
-"""Of films while training: 10 s take some 15 s to draw without a graphics card, and 0.4 MB."""
+"""Video settings during training: 10 s take about 15 s to render without a graphics card, and 0.4 MB."""
 NOT_WORD = str.maketrans({" ": "_", "/": "_"})
 
 
@@ -53,12 +53,12 @@ def with_text(frame: Frame, lines: Sequence[str]) -> Frame:
 
 @contextmanager
 def written_film(path: Path, fps: int) -> Iterator[Callable[[Frame], None]]:
-    """A function that appends a frame (H, W, 3) to an mp4 file, which appears when the block ends without an error."""
+    """Yield a function that appends a frame (H, W, 3) to an mp4 file. The file is created if the block succeeds."""
     path.parent.mkdir(parents=True, exist_ok=True)
     settings = {"fps": fps, "codec": "libx264", "quality": QUALITY, "pixelformat": "yuv420p"}
     folder = Path(mkdtemp(dir=path.parent, prefix=".film-"))
     try:
-        # `closing`: as a context manager, the writer leaves its encoder running where the block raises
+        # `closing`, since the writer's own context manager leaves the encoder running if the block raises
         with closing(imageio.v2.get_writer(folder / path.name, format="FFMPEG", **settings)) as writer:
             yield writer.append_data
         (folder / path.name).replace(path)
@@ -67,9 +67,9 @@ def written_film(path: Path, fps: int) -> Iterator[Callable[[Frame], None]]:
 
 
 def filmed(trials: pd.DataFrame, count: int) -> list[tuple[str, "pd.Series[Any]"]]:
-    """The trials to film, with names: the first trial of up to `count` masses, spread over those with an object.
+    """Trials to film, with names: the first trial of up to `count` cases, evenly spread in order of the table.
 
-    Without any object, over what there is. A single film is of the middle mass. Of the robustness suite nothing.
+    Only trials with an object if there are any; kinds in `UNSEEN` are excluded. A single film is of the middle case.
     """
     first = trials[(trials["trial"] == 0) & ~trials["kind"].isin(UNSEEN)]
     first = first[first["mass"] > 0] if (first["mass"] > 0).any() else first
@@ -96,10 +96,11 @@ def film_episode(
     interrupted: Callable[[], bool] = lambda: False,
     progress: Callable[[float], None] = lambda seconds: None,
 ) -> tuple[Outcome, int]:
-    """Play the first episode of an in-process environment and give its frames to `add`; its outcome, and their number.
+    """Play the first episode of an in-process environment and pass its frames to `add`; returns outcome and number of
+    frames.
 
     `title`: text in every frame, above the line with time and command; `progress` receives the time reached [s]. Raises
-    Interrupted when interrupted, NoRenderer where nothing can be drawn.
+    Interrupted when interrupted, NoRenderer if rendering is not possible.
     """
     renderer: SceneRenderer | None = None
     frames = 0
@@ -131,22 +132,21 @@ def film_trial(
     interrupted: Callable[[], bool] = lambda: False,
     progress: Callable[[float], None] = lambda seconds: None,
 ) -> None:
-    """Play the trial in a row of `trials.parquet` again and give its frames to `add`; see `film_episode`."""
+    """Replay the trial in a row of `trials.parquet` and pass its frames to `add`; see `film_episode`."""
     title = f"{row['variant']}: {row['case']}, {row['mass']:g} kg, trial {row['trial']}"
     with closing(VectorEnv(world, num_envs=1, workers=0, seed=0, episodes=(replayed(row),))) as environment:
         film_episode(environment, in_batch(policy, row), add, video, title, interrupted, progress)
 
 
 class TrainingFilms:
-    """Films of a policy while it trains: the same trial, each time a further part of the training is done. An existing
-    one is not made again."""
+    """Videos of one trial at regular intervals of a training. Existing videos are kept."""
 
     def __init__(self, world: Specification, trial: Trial, folder: Path, parts: int) -> None:
-        """`parts`: into which a training is divided; a film is due after each."""
+        """`parts`: number of equal parts of the training; a video is due after each."""
         self.world, self.trial, self.folder, self.parts = world, trial, folder, parts
 
     def due(self, steps: int, planned: int) -> Path | None:
-        """The newest film that is due after so many of the planned steps, if it is missing."""
+        """Path of the newest video due after `steps` of the planned steps, or None if it exists or none is due."""
         part = min(steps, planned) * self.parts // planned
         if not part:
             return None
@@ -154,7 +154,7 @@ class TrainingFilms:
         return None if path.exists() else path
 
     def make(self, path: Path, policy: Policy, say: Callable[[str], None]) -> bool:
-        """Plays the trial and films it; where nothing can be drawn it says so once, and none is due any more."""
+        """Film the trial; returns True on success. If rendering is not possible, reports it and disables videos."""
         title = f"{self.trial.case}, {self.trial.mass:g} kg, after {int(path.name.partition('_')[0]):,} steps"
         episodes = (self.trial.episode,)
         try:

@@ -55,6 +55,6 @@ TYRE_SUCCESS: dict[str, float] = {"IO-WBC": 0.8, "WBC": 0.0}
 
 
 def reported(suite: str, mass: float, variant: str) -> Errors | Literal["absent"] | None:
-    """The paper's errors for a suite, a mass [kg] and a variant; None where it says "Fails", "absent" where nothing."""
+    """The paper's errors for a suite, mass [kg] and variant; None for "Fails", "absent" if it has no such cell."""
     row = TABLES.get(suite, {}).get(mass, {})
     return row.get(variant, "absent")

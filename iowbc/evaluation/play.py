@@ -1,4 +1,4 @@
-"""One episode to look at: in MuJoCo's viewer in real time where there is a display, or as a film."""
+"""Playback of one episode, in MuJoCo's viewer in real time or as a video file."""
 
 import os
 import sys
@@ -31,24 +31,24 @@ from iowbc.task.vector.vector_env import VectorEnv
 
 @dataclass(frozen=True)
 class Source:
-    """A policy to play, and the world that its recipe describes."""
+    """A policy to play and the specification of its recipe."""
 
     world: Specification
     policy: Path
     """Artifact of `teacher` or `distill`, an exported folder, or the checkpoint of a teacher that is being trained."""
     key: str = ""
-    """That the checkpoint is bound to."""
+    """Stage key to which the checkpoint is bound."""
 
     def environment(self, episode: Episode) -> VectorEnv:
-        """One environment, in this process, that plays an episode. Raises ContractBroken for a world that is none."""
+        """One in-process environment for an episode. Raises ContractBroken if an exported folder is damaged."""
         exported = (self.policy / exported_folder.CONTRACT).is_file()
         with contract.readable(self.policy) if exported else nullcontext():
             return VectorEnv(self.world, num_envs=1, workers=0, seed=0, episodes=(episode,))
 
 
 def asked_by(source: Source, evaluation: Evaluation) -> Source:
-    """The source in the world of another evaluation, with its sequence, scenes and film settings. An exported
-    controller keeps to the scenes that its contract knows."""
+    """The source with the sequence, scenes and video settings of another evaluation. An exported controller keeps the
+    scenes of its contract."""
     asked = source.world.recipe.model_copy(update={"eval": evaluation})
     world = replace(source.world, recipe=asked)
     if not (source.policy / exported_folder.CONTRACT).is_file():
@@ -57,7 +57,7 @@ def asked_by(source: Source, evaluation: Evaluation) -> Source:
 
 
 def exported_source(folder: Path) -> Source:
-    """The source in an exported folder, which holds all it needs. Raises ContractBroken."""
+    """The source in an exported folder, which is self-contained. Raises ContractBroken."""
     return Source(exported_world(folder), folder)
 
 
@@ -67,12 +67,12 @@ def play(
     interrupted: Callable[[], bool] = lambda: False,
     progress: Callable[[float, float], None] = lambda seconds, duration: None,
 ) -> tuple[Episode, Outcome, int]:
-    """Play one episode; in the viewer, or with `request.video` into that mp4 file (no display needed).
+    """Play one episode in the viewer or, with `request.video`, to that mp4 file (no display needed).
 
-    Returns the episode, its outcome, and the pictures of the film; 0 in the viewer. progress: receives how much of a
-    film is drawn, and how long it is to be [s].
+    Returns the episode, its outcome and the number of video frames, 0 in the viewer. progress: receives the rendered
+    and the total duration of a video [s].
 
-    Raises NoDisplay, ContractBroken for a damaged export, Interrupted when interrupted or when the viewer was closed.
+    Raises NoDisplay, ContractBroken for a damaged export, Interrupted when interrupted or when the viewer is closed.
     """
     recipe = source.world.recipe
     episode = requested_episode(recipe, request)
@@ -98,7 +98,7 @@ def play(
 
 
 def requested_episode(recipe: Recipe, request: PlayRequest) -> Episode:
-    """The episode that a request describes. Raises UsageError for a scene that the recipe has not."""
+    """The episode of a request. Raises UsageError if the recipe lacks the scene."""
     require_known(request.scene, "scene", recipe.simulation.scenes.names)
     script = command_script(sequence_for(recipe, request.scene, request.sequence), recipe.task.commands)
     fixed = held_fixed(request.partner_share, disturbed=request.disturbances)

@@ -1,4 +1,4 @@
-"""The request to show one episode of a policy, in the viewer or as a film. Imports nothing heavy."""
+"""Options for playback of one episode of a policy, in the viewer or as a video. Imports only light modules."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,27 +9,27 @@ from iowbc.recipe.evaluation.sequences import Segment
 from iowbc.recipe.simulation.holding import FREE
 
 HEAVIEST = 1000.0
-"""No object is heavier [kg]."""
+"""Maximum mass of an object [kg]."""
 
 
 @dataclass(frozen=True)
 class PlayRequest:
-    """One episode. Raises UsageError for a film that is no mp4."""
+    """Options for playback of one episode. Raises UsageError for an invalid mass or a video file other than mp4."""
 
     scene: str = "lift"
     mass: float = 4.0
-    """Of the object [kg]; 0 plays without one, as the scene `free` does."""
+    """Mass of the object [kg]; 0: no object, as in the scene `free`."""
     partner_share: float | None = 0.0
-    """Part of the weight that the partner bears; None draws it."""
+    """Fraction of the weight carried by the partner; None: random."""
     sequence: tuple[Segment, ...] = ()
-    """Commands; empty takes the recipe's `eval.sequence`."""
+    """Commands; empty: the recipe's `eval.sequence`."""
     seed: int = 0
     disturbances: bool = False
-    """With impulses on the object and pushes on the base."""
+    """Enable random impulses on the object and pushes on the base."""
     video: Path | None = None
     """The mp4 file to write instead of opening the viewer."""
     video_settings: Video | None = None
-    """Of the film; None takes `eval.video`, without its limit of length."""
+    """Video settings; None: `eval.video` without its duration limit."""
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.mass <= HEAVIEST:

@@ -24,34 +24,34 @@ from iowbc.task.specification import Specification
 
 Features = NDArray[np.float32]
 EXACT = 1e-6
-"""Times nearer than this are the same [s]."""
+"""Tolerance for equal times [s]."""
 
 PENALTIES = tuple(10.0**power for power in range(6))
-"""Of the ridge, on standardised features; the best in cross-validation over the trials that are fitted."""
+"""Ridge penalties on standardised features; selected by cross-validation over the training trials."""
 FOLDS = 4
 
 COLUMNS = ["source", "trial", "seconds", "settled", "mass", "size", "inferred"]
-"""Of `probe.parquet`; see `inferred_masses`."""
+"""Columns of `probe.parquet`; see `inferred_masses`."""
 LATENT, HISTORY, NEWEST, PRIVILEGED = "latent", "history H_t", "newest s_t", "s_priv"
 """Sources from which the mass is inferred."""
 
 
 @dataclass(frozen=True)
 class ProbeReadings:
-    """Features observed in the trials, one row a reading."""
+    """Features recorded in the trials, one row per reading."""
 
     features: dict[str, Features]
-    """By what they are of, each of shape (readings, k)."""
+    """Features by source, each of shape (readings, k)."""
     moments: pd.DataFrame
-    """Number of the `trial`, `seconds` since it began with the object in the hands, `settled` (the history holds
-    nothing but observations: it begins as copies of the first), and `mass` of the object [kg]."""
+    """Number of the `trial`, `seconds` since its start with the object in the hands, `settled` (the history no longer
+    holds the initial copies of the first observation), and `mass` of the object [kg]."""
 
 
 class Listener:
-    """Lets a policy act, and keeps what it sees at every so many control steps."""
+    """Wrapper of a policy that records its inputs every `every` control steps."""
 
     def __init__(self, policy: Policy, environments: int, every: int, length: int) -> None:
-        """`length`: of the history, where the policy has none."""
+        """`length`: of the recorded history if the policy has none."""
         self.policy, self.every = policy, every
         self.student = policy.network if isinstance(policy, StudentPolicy) else None
         self.length = policy.length if isinstance(policy, StudentPolicy) else length
@@ -111,7 +111,7 @@ def read(
     interrupted: Callable[[], bool] = lambda: False,
     progress: Callable[[float], None] = lambda seconds: None,
 ) -> ProbeReadings:
-    """Play the trials of `eval.probe` and keep what is seen while they last. Raises Interrupted when interrupted."""
+    """Play the trials of `eval.probe` and record features until each ends. Raises Interrupted when interrupted."""
     recipe = world.recipe
     episodes, probe = probe_episodes(recipe), recipe.eval.probe
     assert probe is not None
@@ -133,8 +133,8 @@ def gathered(
 ) -> ProbeReadings:
     """Readings of all trials in one table, without those after a trial's end.
 
-    kept: of each time, rows by trial; going: (times, trials); times: (times,) [s]; masses: (trials,) [kg]; span: of a
-    history [s].
+    kept: features at each time, one row per trial; going: True before a trial's end, (times, trials); times: (times,)
+    [s]; masses: (trials,) [kg]; span: duration of a history [s].
     """
     moment, trial = np.nonzero(going)
     features = {name: np.stack([seen[name] for seen in kept])[moment, trial] for name in kept[0]}
@@ -145,11 +145,11 @@ def gathered(
 
 
 def inferred_masses(readings: ProbeReadings) -> pd.DataFrame:
-    """The mass as it is read in the trials that were not fitted, one row a reading and source.
+    """Inferred masses in the test trials, one row per reading and source.
 
-    Columns: `source` and its `size`, `trial`, `seconds`, `settled` (whether the history was full), `mass` and
-    `inferred` [kg]. Trials of even number are fitted, as soon as they have settled, those of odd number tested: no
-    regression has seen another reading of the trial that it is tested on. Raises StageFailed where too few trials last.
+    Columns: `source` and its `size`, `trial`, `seconds`, `settled` (True if the history was full), `mass` and
+    `inferred` [kg]. The regression is fitted to settled readings of even trials and tested on odd trials, so that no
+    trial is in both sets. Raises StageFailed if too few trials last long enough.
     """
     moments = readings.moments
     tested = moments["trial"] % 2 == 1

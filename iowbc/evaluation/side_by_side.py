@@ -1,4 +1,4 @@
-"""A film of several variants on the same trial, side by side."""
+"""Video of several variants on the same trial, side by side."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -17,22 +17,22 @@ from iowbc.learning.acting import Policy
 from iowbc.task.specification import Specification
 
 TRIAL = ["suite", "case", "mass", "impulse", "trial"]
-"""Columns that tell one trial of a variant from another."""
+"""Columns that identify a trial of a variant."""
 
 
 @dataclass(frozen=True)
 class Actor:
-    """A variant on the stage."""
+    """A variant in the video."""
 
     world: Specification
-    """World of its trials."""
+    """Specification of its trials."""
     policy: Policy
     trials: pd.DataFrame
     """Its long table."""
 
 
 def common_trial(actors: Sequence[Actor]) -> list["pd.Series[Any]"]:
-    """The row of each actor for one trial that all played, of the middle mass; none where they share no trial."""
+    """Rows of all actors for one common trial of the middle mass; empty if they have no trial in common."""
     shared = actors[0].trials
     for actor in actors[1:]:
         shared = shared.merge(actor.trials[TRIAL], on=TRIAL)
@@ -49,10 +49,10 @@ def film_side_by_side(
     path: Path,
     progress: Callable[[float, float], None],
 ) -> None:
-    """Play the trial in each actor's row again, and film them as tiles; who falls stays as he lay.
+    """Replay the trial in each actor's row and film them as tiles; a trial that ends early keeps its last frame.
 
-    progress: receives the time of all trials that was played, and how long they may last together [s]. Raises
-    NoRenderer where nothing can be drawn.
+    progress: receives the time played in all trials and their total maximum duration [s]. Raises NoRenderer if
+    rendering is not possible.
     """
     video = actors[0].world.recipe.eval.video
     with TemporaryDirectory() as place:
@@ -76,7 +76,7 @@ def film_side_by_side(
 
 
 def tiled(frames: Sequence[Frame]) -> Frame:
-    """Frames of one size as one picture, in rows of equal length, black where there is none."""
+    """Frames of one size as one image, in rows of equal length; empty tiles are black."""
     columns = math.ceil(math.sqrt(len(frames)))
     rows = math.ceil(len(frames) / columns)
     empty = [np.zeros_like(frames[0])] * (rows * columns - len(frames))

@@ -23,7 +23,7 @@ class Policy(Protocol):
     """A deterministic controller of n environments."""
 
     def reset(self, which: NDArray[np.bool_]) -> None:
-        """Forget the past of the marked environments, shape (n,); call before the first `act` of an episode."""
+        """Clear the history of the marked environments, shape (n,); call before the first `act` of an episode."""
 
     def act(self, observation: NDArray[np.float32], privileged: NDArray[np.float32]) -> NDArray[np.float32]:
         """Mean residual action, shape (n, A), from s_t, shape (n, S), and s_priv, shape (n, P)."""
@@ -85,9 +85,9 @@ def policy_of(network: Network, architecture: Mapping[str, Any]) -> Policy:
 
 
 def unfinished_policy(path: Path, key: str, settings: Teacher, mirrors: Mirrors) -> Policy:
-    """The policy as the checkpoint at `path` of the stage's key has it, or the one before it where that is damaged.
+    """Policy of a training in progress, from the checkpoint at `path` or, if that is damaged, the previous one.
 
-    mirrors: of a row (s_t, s_priv) and of an action. Raises `Damaged` where there is no whole checkpoint.
+    key: of the stage. mirrors: of a row (s_t, s_priv) and of an action. Raises `Damaged` if no checkpoint is intact.
     """
     for candidate in (path, previous(path)):
         try:

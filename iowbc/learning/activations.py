@@ -1,4 +1,4 @@
-"""Activations, and how a pair of mirrored units goes through one."""
+"""Activation functions, also for pairs of mirrored units."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -16,7 +16,7 @@ class Activation(NamedTuple):
     module: type[nn.Module]
     function: Callable[[Tensor], Tensor]
     backward: Callable[[Tensor, Tensor], Tensor]
-    """Gradient before the activation from that behind it and its value."""
+    """Gradient at the input, from the gradient at the output and the output value."""
 
 
 ACTIVATIONS = {
@@ -24,13 +24,13 @@ ACTIVATIONS = {
     "relu": Activation(nn.ReLU, torch.relu, lambda grad, y: aten.threshold_backward(grad, y, 0)),
     "tanh": Activation(nn.Tanh, torch.tanh, lambda grad, y: aten.tanh_backward(grad, y)),
 }
-"""By their name in a recipe."""
+"""Activations by their name in a recipe."""
 
 
 class PairedActivation(nn.Module):
-    """Activates units (a, b) that are given as halves of sum and difference; returns a' + b' and a' - b'.
+    """Activation of unit pairs (a, b). Inputs are (a + b) / 2 and (a - b) / 2, outputs a' + b' and a' - b'.
 
-    The mirror swaps a and b, so it keeps the first result and negates the second, whatever the activation.
+    Mirroring swaps a and b: the first output stays, the second changes sign, whatever the activation.
     """
 
     def __init__(self, name: str) -> None:
@@ -46,7 +46,7 @@ class PairedActivation(nn.Module):
 
 
 class _Paired(Function):
-    """The same with a backward pass in half the steps and memory that torch would take on its own."""
+    """`PairedActivation` with a backward pass of half the steps and memory of torch's automatic one."""
 
     @staticmethod
     def forward(ctx: Any, even: Tensor, odd: Tensor, activation: Activation) -> tuple[Tensor, Tensor]:

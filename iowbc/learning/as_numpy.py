@@ -1,4 +1,4 @@
-"""Trained networks as the policies in NumPy that rollouts are made with: the same function, to rounding."""
+"""Conversion of trained networks to NumPy policies for rollouts; outputs agree up to rounding."""
 
 import numpy as np
 import torch
@@ -16,7 +16,7 @@ from iowbc.rollouts.policies import HistoryEncoder, HistoryPolicy, Layers, Linea
 
 
 def acting_policy(policy: ActorCritic) -> RowPolicy | HistoryPolicy:
-    """The mean action of PPO's policy."""
+    """NumPy policy of the mean action of PPO's policy."""
     normalizer, actor = policy.normalizer, policy.actor
     if isinstance(actor, HistoryActor):
         return _history_policy(actor.network, _normal(normalizer, actor.observation))
@@ -24,21 +24,21 @@ def acting_policy(policy: ActorCritic) -> RowPolicy | HistoryPolicy:
 
 
 def teacher_policy(network: TeacherNetwork) -> RowPolicy:
-    """A teacher's."""
+    """NumPy policy of a teacher."""
     return RowPolicy(_normal(network.normalizer), layers_of(network.body))
 
 
 def student_policy(network: StudentNetwork) -> HistoryPolicy:
-    """A student's."""
+    """NumPy policy of a student."""
     return _history_policy(network, _normal(network.normalizer))
 
 
 @torch.no_grad()
 def layers_of(network: nn.Module) -> Layers:
-    """Layers of a perceptron; of a symmetric one with its units (a, b) instead of sums and differences.
+    """Layers of a perceptron. Those of a symmetric one act on units (a, b) instead of sums and differences.
 
-    Of the sums a layer makes E·(a + b), of the differences O·(a - b), and the units behind it are the activations of
-    sum and difference of the two: (E + O)·a + (E - O)·b, and (E - O)·a + (E + O)·b. The first layer takes in the basis.
+    A symmetric layer computes E·(a + b) and O·(a - b). Its output units are the activations of their sum,
+    (E + O)·a + (E - O)·b, and difference, (E - O)·a + (E + O)·b. The basis is folded into the first layer.
     """
     if isinstance(network, DenseMlp):
         layers = [layer for layer in (*network.layers, network.last) if isinstance(layer, nn.Linear)]
@@ -64,7 +64,7 @@ def layers_of(network: nn.Module) -> Layers:
 
 
 def _head(head: SymmetricHead) -> Linear:
-    """A head on units (a, b) instead of sums and differences."""
+    """Symmetric head as a linear layer on units (a, b) instead of sums and differences."""
     even, odd = head.basis.matrix[:, : head.basis.even].T, head.basis.matrix[:, head.basis.even :].T
     units = next(layer.weight.shape[1] for layer in (head.even, head.odd) if layer is not None)
     sums = differences = torch.zeros(units, len(head.basis.matrix))
@@ -97,7 +97,7 @@ def _linear(layer: nn.Linear) -> Linear:
 
 
 def _normal(normalizer: Normalizer, size: int | None = None) -> Normal:
-    """`size`: of the part of the statistics that is meant."""
+    """Input normalization; `size`: number of leading entries to keep."""
     return Normal(_array(normalizer.mean[:size]), _array(normalizer.std[:size]), normalizer.clip)
 
 

@@ -12,37 +12,37 @@ from iowbc.learning.checkpoint import Arrays, module_arrays, prefixed, under
 from iowbc.recipe.teacher import Check
 
 ACTS = ("actor.", "log_stds")
-"""Beginnings of the names of an `ActorCritic`'s arrays that decide its actions."""
+"""Name prefixes of the arrays of an `ActorCritic` that determine its actions."""
 
 
 class Best:
-    """State of a learner when it scored best, and the caution with which it goes on."""
+    """Best learner state so far, with rollback to it after a collapse."""
 
     def __init__(self, settings: Check, learner: Arrays) -> None:
-        """`learner`: everything that it has learnt before the first update."""
+        """`learner`: state before the first update."""
         self.settings = settings
         self.learner = learner
         self.score = 0.0
         self.caution = 1.0
         """Factor of the desired KL divergence."""
         self.rollbacks = 0
-        """Since the last better policy."""
+        """Rollbacks since the last improvement."""
         self.low = 0
-        """Scores in a row that were far below the best."""
+        """Number of consecutive scores far below the best."""
 
     def collapsed(self, score: float) -> bool:
-        """True where this score, after those before, says that the training got lost."""
+        """True if this is the last of `patience` consecutive scores far below the best."""
         far_below = self.score >= self.settings.notable and score < (1.0 - self.settings.collapse) * self.score
         self.low = self.low + 1 if far_below else 0
         return self.low >= self.settings.patience
 
     def offer(self, score: float, learner: Arrays) -> None:
-        """Keeps what has been learnt where it scores at least as well as ever."""
+        """Keep this learner state if its score equals or exceeds the best."""
         if score >= self.score:
             self.score, self.learner, self.rollbacks = score, learner, 0
 
     def go_back(self, why: str) -> Arrays:
-        """The learner's state at its best, for more cautious updates. Raises StageFailed when that did not help."""
+        """Best learner state; also lowers `caution`. Raises StageFailed after too many rollbacks."""
         self.rollbacks += 1
         if self.rollbacks > self.settings.rollbacks:
             raise StageFailed(
@@ -54,7 +54,7 @@ class Best:
         return self.learner
 
     def arrays(self) -> Arrays:
-        """Everything, for a checkpoint."""
+        """State for a checkpoint."""
         return {
             **prefixed("learner", self.learner),
             "score": np.array([self.score, self.caution]),
@@ -72,23 +72,23 @@ class PolicyAverage:
     """Exponentially weighted mean of weights and standard deviations."""
 
     def __init__(self, policy: nn.Module, half_life: float) -> None:
-        """`half_life`: updates in which the weight of a policy in the mean halves."""
+        """`half_life`: number of updates after which the weight of a policy in the mean has halved."""
         self.newest = 1.0 - 0.5 ** (1.0 / half_life)
         """Weight of the newest policy."""
         self.arrays: Arrays = acting_part(module_arrays(policy))
 
     def take(self, policy: nn.Module) -> None:
-        """Takes the newest policy into account."""
+        """Update the mean with the newest policy."""
         newest = acting_part(module_arrays(policy))
         self.arrays = {
             name: mean + np.float32(self.newest) * (newest[name] - mean) for name, mean in self.arrays.items()
         }
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Goes on from this mean."""
+        """Restore the mean from a checkpoint."""
         self.arrays = acting_part(arrays)
 
 
 def acting_part(arrays: Mapping[str, NDArray[Any]]) -> Arrays:
-    """Those arrays of an `ActorCritic` that decide how it acts."""
+    """Arrays of an `ActorCritic` that determine its actions."""
     return {name: value for name, value in arrays.items() if name.startswith(ACTS)}

@@ -1,4 +1,4 @@
-"""One atomic file with everything that a resumed training needs, bound to the stage's key."""
+"""Checkpoints: one atomically written file with the whole training state, bound to the stage's key."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -16,13 +16,13 @@ Arrays = dict[str, NDArray[Any]]
 
 
 def save_checkpoint(path: Path, key: str, arrays: Mapping[str, NDArray[Any]]) -> None:
-    """Replace the checkpoint at `path` and keep the one before beside it; a crash at any moment leaves one of them."""
+    """Replace the checkpoint at `path` and keep the previous one beside it. A crash at any time leaves one intact."""
     content = save({name: np.ascontiguousarray(value) for name, value in arrays.items()})
     write_checked(path, key, content, keep_previous=True)
 
 
 def load_checkpoint(path: Path, key: str, say: Callable[[str], None]) -> Arrays | None:
-    """Arrays of the newest whole checkpoint of this key, or None; `say` receives damaged ones, now put aside."""
+    """Arrays of the newest intact checkpoint of this key, or None; damaged ones are moved aside and passed to `say`."""
     content, damaged = newest_checked(path, key)
     if damaged:
         names, verb = " and ".join(damaged), "is" if len(damaged) == 1 else "are"
@@ -37,7 +37,7 @@ def prefixed(prefix: str, arrays: Mapping[str, NDArray[Any]]) -> Arrays:
 
 
 def under(prefix: str, arrays: Mapping[str, NDArray[Any]]) -> Arrays:
-    """The arrays whose names begin with `prefix/`, without it."""
+    """The arrays whose names begin with `prefix/`, with the prefix removed."""
     return {name[len(prefix) + 1 :]: value for name, value in arrays.items() if name.startswith(prefix + "/")}
 
 

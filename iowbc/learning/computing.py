@@ -1,8 +1,8 @@
-"""Numbers and threads of the networks while they learn.
+"""Numerical precision and threads of the networks during training.
 
-Parts of a minibatch are computed side by side by threads of our own, because torch's wait for one another in every
-layer. One that waits spins, and where something else runs on its core all of them spin most of the time: an update that
-takes a second took two minutes. Here threads meet once a minibatch. Results depend on the parts, not on the threads.
+Parts of a minibatch run in parallel in our own threads, which synchronize once a minibatch. Torch's threads synchronize
+in every layer and spin while they wait: with another program on one of their cores, an update of one second took two
+minutes. Results depend on the number of parts, not of threads.
 """
 
 from collections.abc import Callable, Sequence
@@ -20,24 +20,26 @@ Result = TypeVar("Result")
 
 
 def prepare_process() -> None:
-    """One thread for torch in this process: of more, small networks gain little, and round in another order. Freed
-    memory is kept for the next arrays."""
+    """Limit torch to one thread in this process and keep freed memory for later arrays.
+
+    Small networks gain little from more threads, which also change the order of rounding.
+    """
     torch.set_num_threads(1)
     keep_freed_memory()
 
 
 class SideBySide:
-    """Computes functions of the parts of a batch on several cores."""
+    """Parallel evaluation of a function on the parts of a batch."""
 
     def __init__(self, parts: int, cores: int) -> None:
-        """`parts`: into which a batch is split; `cores`: that are used at most."""
+        """`parts`: number of parts of a batch; `cores`: maximum number of threads."""
         self.parts = parts
         self._pool = None
         if min(parts, cores) > 1:
             self._pool = ThreadPoolExecutor(min(parts, cores), initializer=torch.set_num_threads, initargs=(1,))
 
     def __call__(self, function: Callable[[Tensor], Result], batch: Tensor) -> list[Result]:
-        """The function of each part of a batch of rows, in their order."""
+        """Results of the function for each part of a batch of rows, in order."""
         parts: Sequence[Tensor] = torch.tensor_split(batch, self.parts)
         return list(map(function, parts) if self._pool is None else self._pool.map(function, parts))
 
@@ -49,10 +51,10 @@ def has_bfloat16() -> bool:
 
 
 def reduced(precision: Precision) -> AbstractContextManager[None]:
-    """A context in which layers multiply in bfloat16, where the recipe and the processor say so.
+    """Context in which layers multiply in bfloat16: if `precision` says so, or for "auto" if the processor can.
 
-    Without torch's cache of converted weights: all threads share it and any of them empties it, so that a layer that is
-    used twice would sometimes sum its gradients in bfloat16.
+    Torch's cache of converted weights is off. All threads share it and any of them empties it; a layer used twice would
+    then sometimes sum its gradients in bfloat16.
     """
     wanted = precision == "bfloat16" or (precision == "auto" and has_bfloat16())
     return torch.autocast("cpu", torch.bfloat16, enabled=wanted, cache_enabled=False)

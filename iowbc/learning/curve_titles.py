@@ -43,7 +43,7 @@ TITLES = {
     "action_agreement": "agreement with the teacher [share]",
     "teacher_share": "environments that the teacher drives [share]",
 }
-"""By the name under which a figure is recorded."""
+"""Titles by the name of the recorded quantity."""
 FAMILIES = {
     "robot/": "{} of the robot's skill",
     "human/": "{} of the human's policy",
@@ -54,13 +54,13 @@ FAMILIES = {
     "reward/": "reward of {} [1/s]",
     "seconds/": "time of an update, {} [s]",
 }
-"""By the beginning of the name; the rest takes the place of the braces."""
+"""Titles by name prefix; the rest of the name replaces the braces."""
 ERROR_UNITS = {"velocity": "m/s", "heading": "rad", "height": "m", "pitch": "rad"}
 """Units of `error/<scene>/<standing or walking>/<error>`."""
 
 
 def title_of(name: str) -> str:
-    """Title of a panel; a name that is not listed is its own."""
+    """Title of a panel; the name itself if it is not listed."""
     family, _, rest = name.partition("/")
     if family == "error" and rest.count("/") == 2:
         scene, kind, error = rest.split("/")

@@ -1,4 +1,4 @@
-"""Learning curves: one line of JSON an update, kept beside the checkpoint, their table and their figure."""
+"""Learning curves: a file with one line of JSON per update beside the checkpoint, a table and a figure."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -10,15 +10,15 @@ from iowbc.learning.curve_titles import title_of
 from iowbc.results.frame import write_frame
 
 TABLE, FIGURE = "tables/learning_curves.parquet", "figures/learning_curves.png"
-"""Files of them in an artifact."""
+"""Paths in an artifact."""
 DIGITS = 6
-"""Significant digits that are kept; those of single precision."""
+"""Significant digits kept, as in single precision."""
 OUTLIERS = (1.0, 99.0)
-"""Percentiles between which a panel's values always lie inside of it."""
+"""Percentiles of a panel's values that its vertical axis always covers."""
 FLATTENED = 10.0
-"""A panel this many times as high as what lies between the percentiles is cut."""
+"""A panel is cut if its height exceeds the range between the percentiles by this factor."""
 MARGIN = 0.5
-"""Room above and below in a panel that was cut, in heights of what lies between the percentiles."""
+"""Space above and below in a cut panel, as a fraction of the range between the percentiles."""
 
 
 class Curves:
@@ -45,7 +45,7 @@ class Curves:
             file.write(json.dumps(row) + "\n")
 
     def write_table(self, path: Path) -> None:
-        """All rows as a Parquet table of single precision, one column a name; a value that a row lacks is NaN."""
+        """Write all rows to a Parquet table in single precision, one column per name; missing values are NaN."""
         import pandas as pd
 
         table = pd.DataFrame(self.rows, columns=list(dict.fromkeys(name for row in self.rows for name in row)))
@@ -54,7 +54,7 @@ class Curves:
 
     @staticmethod
     def restore(table: Path, path: Path) -> None:
-        """Write the rows of a table that `write_table` wrote to `path`, as `append` does."""
+        """Convert a table of `write_table` back to the file of JSON lines at `path`."""
         import pandas as pd
 
         again = Curves(path, 0)
@@ -62,7 +62,7 @@ class Curves:
             again.append(int(step), row.dropna().to_dict())
 
     def write_figure(self, path: Path, title: str, panels: Sequence[str]) -> None:
-        """One panel a name, those without values left out; an outlier that would flatten the rest lies outside."""
+        """Plot one panel per name that has values. Panels are cut where outliers would flatten the rest."""
         import numpy as np
         from matplotlib.figure import Figure
 
@@ -89,7 +89,7 @@ class Curves:
     def write_artifact(
         self, out: Path, title: str, panels: Sequence[str], terms: Sequence[str] = ()
     ) -> dict[str, float]:
-        """Table and figure (of `panels`, then `terms`); returns, of the last row, the metrics of a training stage."""
+        """Write table and figure (`panels`, then `terms`); returns a training stage's metrics, from the last row."""
         for name in (TABLE, FIGURE):
             (out / name).parent.mkdir()
         self.write_table(out / TABLE)
@@ -99,5 +99,5 @@ class Curves:
 
 
 def _whole(row: Any) -> bool:
-    """True for a row of numbers with its step."""
+    """True if `row` is a complete row: numbers by name, including the step."""
     return isinstance(row, dict) and "step" in row and all(isinstance(value, (int, float)) for value in row.values())

@@ -12,20 +12,20 @@ from iowbc.robot.mirror import MirrorMap
 
 
 def spread(environments: int) -> NDArray[np.float64]:
-    """Numbers in [0, 1), shape (n,), evenly spread over any run of neighbours: multiples of the golden ratio, modulo 1.
+    """Low-discrepancy numbers in [0, 1), shape (n,): multiples of the golden ratio, modulo 1.
 
-    The teacher drives the environments whose number is below its share; neighbours play the same scene, and in every
-    scene it then drives the same share.
+    The teacher controls the environments whose number is below its share. Neighbouring environments have the same
+    scene, and any run of neighbours covers [0, 1) evenly; so the teacher's share is the same in every scene.
     """
     golden = (math.sqrt(5.0) - 1.0) / 2.0
     return np.array([index * golden % 1.0 for index in range(environments)])
 
 
 class Experience:
-    """A ring of the newest control steps of n environments: s_t, what it should be answered, the age of the episode.
+    """Ring buffer of the newest control steps of n environments: s_t, target and age of the episode in steps.
 
-    A sample is the history H_t that the student saw, rebuilt from the ring, and the answer to it: the teacher's action,
-    and what else is to be learnt.
+    A sample is the student's history H_t, rebuilt from the buffer, and its target: the teacher's action and any further
+    regression targets.
     """
 
     def __init__(self, capacity: int, environments: int, observation: int, targets: int, history: int) -> None:
@@ -37,7 +37,7 @@ class Experience:
         self.added = 0
 
     def add(self, observation: NDArray[np.float32], target: NDArray[np.float32], starts: NDArray[np.bool_]) -> None:
-        """Append a control step: s_t, shape (n, S), the answer, shape (n, T), and where an episode starts."""
+        """Append a control step: s_t, shape (n, S), the target, shape (n, T), and where an episode starts."""
         slot, last = self.added % self.steps, (self.added - 1) % self.steps
         self.observations[slot] = observation
         self.targets[slot] = target
@@ -45,7 +45,7 @@ class Experience:
         self.added += 1
 
     def sample(self, batch: int, random: np.random.Generator) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Histories, shape (batch, K, S), and answers, shape (batch, T), drawn uniformly."""
+        """Histories, shape (batch, K, S), and targets, shape (batch, T), drawn uniformly."""
         oldest = 0 if self.added <= self.steps else self.added - self.steps + self.history - 1
         times = random.integers(oldest, self.added, batch)
         environments = random.integers(0, self.observations.shape[1], batch)
@@ -56,7 +56,7 @@ class Experience:
         return frames, self.targets[times % self.steps, environments]
 
     def arrays(self) -> Arrays:
-        """Everything, for a checkpoint."""
+        """State for a checkpoint."""
         return {
             "observations": self.observations,
             "targets": self.targets,

@@ -1,4 +1,4 @@
-"""The student's loss: KL(teacher || student) (paper eq. 7), and the error of what is read from its latent."""
+"""Student loss: KL(teacher || student) (paper eq. 7) and the auxiliary error of facts predicted from the latent."""
 
 from typing import Literal
 
@@ -15,7 +15,7 @@ Symmetry = Literal["construction", "augment", "none"]
 
 
 class DistillationLoss(nn.Module):
-    """The student's network with all that is learnt beside it: its standard deviation, and what reads its latent."""
+    """Student loss with all trained modules: the network, its standard deviation and the auxiliary head."""
 
     teacher_log_std: Tensor
     std_place: Tensor
@@ -29,8 +29,8 @@ class DistillationLoss(nn.Module):
         action_mirror: MirrorMap,
         symmetry: Symmetry,
     ) -> None:
-        """`teacher_log_std`: not below the recipe's floor, (A,); the mirrors: of the facts that the latent is to
-        tell, and of the action."""
+        """`teacher_log_std`: not below the recipe's floor, (A,); mirrors: of the auxiliary targets (facts) and of the
+        action."""
         super().__init__()
         self.settings, self.network = settings, network
         self.register_buffer("teacher_log_std", teacher_log_std.clone())
@@ -40,7 +40,7 @@ class DistillationLoss(nn.Module):
         kinds = np.unique(place, return_index=True)[1]
         self.register_buffer("std_place", torch.from_numpy(place), persistent=False)
         self.log_stds = nn.Parameter(teacher_log_std[kinds].clone(), requires_grad=settings.std == "learnt")
-        """One for each pair of actions that the mirror swaps, and one for each other."""
+        """One per pair of actions that the mirror swaps, and one per remaining action."""
         both = (swap(settings.latent // 2), facts_mirror) if symmetric else None
         self.reader = perceptron(settings.latent, (settings.latent,), facts, settings.activation, both)
 
@@ -50,7 +50,7 @@ class DistillationLoss(nn.Module):
         return self.log_stds[self.std_place].clamp(min=float(np.log(self.settings.std_floor)))
 
     def forward(self, histories: Tensor, answers: Tensor) -> tuple[Tensor, dict[str, float]]:
-        """The loss of histories, (n, K, S), with the teacher's actions and the facts, (n, A + facts), and its parts."""
+        """Loss and its parts. Histories, (n, K, S); answers: the teacher's actions and the facts, (n, A + facts)."""
         target, facts = answers[:, : self.actions], answers[:, self.actions :]
         newest, latent = self.network.read(histories)
         mean = self.network.act(newest, latent)

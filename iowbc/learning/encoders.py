@@ -1,4 +1,4 @@
-"""The student's encoder: a history of observations to a latent, and s_priv as it is read from that."""
+"""The student's encoder from a history of observations to a latent, and the estimate of s_priv from it."""
 
 from typing import Literal
 
@@ -13,8 +13,8 @@ EncoderName = Literal["mlp"]
 
 
 class MlpEncoder(nn.Module):
-    """(n, K, S) normalised, oldest first, to (n, latent): projects each observation by the same layer, and all
-    projections by another."""
+    """Normalised history, (n, K, S), oldest first, to latent, (n, latent): one layer shared by all observations, then
+    one layer on all their features."""
 
     def __init__(self, observation: int, history: int, features: int, latent: int, activation: str) -> None:
         super().__init__()
@@ -27,8 +27,8 @@ class MlpEncoder(nn.Module):
 
 
 class MirroredEncoder(nn.Module):
-    """An encoder of half the size, of a history and of its mirror image: the halves of the latent are then swapped
-    when the history is mirrored."""
+    """Encoder of half the size, applied to a history and to its mirror image. Mirroring the history therefore swaps
+    the halves of the latent."""
 
     permutation: Tensor
     sign: Tensor
@@ -43,7 +43,7 @@ class MirroredEncoder(nn.Module):
     def forward(self, history: Tensor) -> Tensor:
         first, activate = self.encoder.frame
         assert isinstance(first, nn.Linear)
-        # the image's features by mirrored weights: they are smaller than the histories of a batch
+        # mirror the weights rather than the histories: they are smaller
         mirrored = torch.index_select(first.weight * self.sign, 1, self.permutation)
         both = nn.functional.linear(history, torch.cat([first.weight, mirrored]), first.bias.repeat(2))
         own, image = activate(both).chunk(2, dim=-1)
@@ -51,10 +51,10 @@ class MirroredEncoder(nn.Module):
 
 
 class PrivilegedEstimate(nn.Module):
-    """A linear map from the latent to s_priv in the teacher's normalisation, at first its mean, zero."""
+    """Linear map from the latent to s_priv in the teacher's normalisation; starts at zero, the mean of s_priv."""
 
     def __init__(self, latent: int, size: int, mirror: MirrorMap | None) -> None:
-        """`size`: of s_priv; `mirror`: its mirror, where that swaps the halves of the latent."""
+        """`size`: of s_priv; `mirror`: of s_priv if mirroring swaps the halves of the latent, else None."""
         super().__init__()
         self.symmetric = mirror is not None
         self.head = nn.Linear(latent, size) if mirror is None else SymmetricHead(latent, mirror)

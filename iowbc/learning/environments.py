@@ -1,4 +1,4 @@
-"""Requests of the learners to the environments."""
+"""Interface between learners and environments."""
 
 from collections.abc import Mapping
 from typing import Any, Protocol
@@ -11,24 +11,24 @@ from iowbc.rollouts.trajectories import Trajectories
 
 
 class Environments(Protocol):
-    """A stable-baselines3 vector environment that makes whole rollouts, and can be stopped and continued; `VectorEnv`
-    of the task is one."""
+    """Stable-baselines3 vector environment that makes whole rollouts and can be saved and restored, such as the task's
+    `VectorEnv`."""
 
     num_envs: int
     observation_space: Any
     action_space: Any
 
     def reset(self) -> NDArray[np.float32]:
-        """Observations, (num_envs, size), at the beginning of an episode everywhere."""
+        """Start an episode in every environment; returns observations, (num_envs, size)."""
 
     def roll(self, rollout_policy: RolloutPolicy, steps: int) -> Trajectories:
-        """Make a rollout of some control steps."""
+        """Make a rollout of `steps` control steps."""
 
     def statistics(self) -> dict[str, float]:
-        """Figures since the last call."""
+        """Statistics since the last call."""
 
     def state(self) -> dict[str, NDArray[Any]]:
-        """Everything that the future depends on."""
+        """Complete state, for a checkpoint."""
 
     def restore(self, state: Mapping[str, NDArray[Any]]) -> None:
         """Inverse of `state`."""

@@ -30,6 +30,6 @@ def divergence(mean: Tensor, log_std: Tensor, other_mean: Tensor, other_log_std:
 
 
 def std_places(actions: int, mirror: MirrorMap | None) -> NDArray[np.int64]:
-    """Place of the standard deviation of each action, (A,): actions that the mirror swaps share one."""
+    """Index of each action's standard deviation, (A,); actions that the mirror swaps share one."""
     own = np.arange(actions) if mirror is None else np.minimum(np.arange(actions), mirror.permutation)
     return np.asarray(np.unique(own, return_inverse=True)[1], np.int64)

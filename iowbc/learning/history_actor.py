@@ -1,4 +1,4 @@
-"""The student's network and a privileged critic as PPO calls them: on rows of a normalised H_t with s_priv behind."""
+"""The student's network and a privileged critic for PPO, on rows of a normalised H_t followed by s_priv."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -14,7 +14,7 @@ from iowbc.robot.mirror import MirrorMap
 
 
 def student_architecture(teacher: Teacher, observation: int, actions: int, mirrors: Mirrors) -> dict[str, Any]:
-    """Arguments of the `StudentNetwork` that a recipe asks for; `mirrors`: of a row (s_t, s_priv) and of an action."""
+    """Arguments of a recipe's `StudentNetwork`; `mirrors`: of a row (s_t, s_priv) and of an action."""
     assert teacher.history is not None
     rows, action = mirrors
     sign = np.asarray(rows.sign)
@@ -36,7 +36,7 @@ def student_architecture(teacher: Teacher, observation: int, actions: int, mirro
 
 
 class HistoryNormalizer(Normalizer):
-    """Normalises rows (H_t, s_priv) by the statistics of (s_t, s_priv), the same for all observations of a history."""
+    """Normalisation of rows (H_t, s_priv) by the statistics of (s_t, s_priv), equal for all steps of a history."""
 
     def __init__(self, size: int, clip: float, architecture: Mapping[str, Any]) -> None:
         """`size`: of (s_t, s_priv)."""
@@ -50,12 +50,12 @@ class HistoryNormalizer(Normalizer):
         return (x - self.mean[every]).div_(self.std[every]).clamp_(-self.clip, self.clip)
 
     def newest(self, rows: Any) -> Any:
-        """The part (s_t, s_priv) of rows, (..., size)."""
+        """Newest part (s_t, s_priv) of rows, shape (..., size)."""
         return rows[..., (self.length - 1) * self.observation :]
 
 
 class HistoryActor(Perceptron):
-    """The student's network behind its normalisation."""
+    """The student's network without its input normalisation."""
 
     def __init__(self, architecture: Mapping[str, Any]) -> None:
         super().__init__()
@@ -78,7 +78,7 @@ class HistoryActor(Perceptron):
 
 
 class NewestCritic(Perceptron):
-    """A value of (s_t, s_priv) alone: it knows what the history is to tell."""
+    """Critic of (s_t, s_priv) alone: s_priv contains what the actor must infer from the history."""
 
     def __init__(self, critic: Perceptron, normalizer: HistoryNormalizer) -> None:
         super().__init__()

@@ -1,4 +1,4 @@
-"""Environments that deliver the history of what they observe: rows of H_t, oldest first, with s_priv behind."""
+"""Environments with observation history: rows of H_t, oldest first, followed by s_priv."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -15,10 +15,10 @@ from iowbc.rollouts.trajectories import Trajectories
 
 
 class HistoryEnvironments(VecEnvWrapper):  # type: ignore[misc]
-    """A vector environment of rows (s_t, s_priv) as one of rows (H_t, s_priv); see `Environments`."""
+    """Wrapper that turns rows (s_t, s_priv) of a vector environment into rows (H_t, s_priv); see `Environments`."""
 
     def __init__(self, environments: Any, observation: int, length: int) -> None:
-        """`observation`: size of s_t, with which the rows begin; `length`: observations in a history."""
+        """`observation`: size of s_t, the first part of a row; `length`: observations in a history."""
         (size,) = environments.observation_space.shape
         self._size, self._length = observation, length
         self._history = History(environments.num_envs, length, observation)
@@ -26,20 +26,20 @@ class HistoryEnvironments(VecEnvWrapper):  # type: ignore[misc]
         super().__init__(environments, observation_space=spaces.Box(-np.inf, np.inf, (width,), np.float32))
 
     def reset(self) -> NDArray[np.float32]:
-        """Rows at the beginning of an episode everywhere."""
+        """Start an episode in every environment; returns the first rows."""
         row = self.venv.reset()
         return self._rows(row, np.ones(len(row), np.bool_))
 
     def step_wait(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
-        """As the environments' own; the last observation of an episode comes with the history before it."""
+        """Step as in the wrapped environments; the last observation of an episode includes its history."""
         row, rewards, dones, infos = self.venv.step_wait()
         for index in np.flatnonzero(dones).tolist():
             infos[index]["terminal_observation"] = self._last_row(index, infos[index]["terminal_observation"])
         return self._rows(row, dones), rewards, dones, infos
 
     def roll(self, rollout_policy: ExploringPolicy, steps: int) -> Trajectories:
-        """See `Environments`; the policy sees histories, which the rows of its trajectories then are."""
-        before = np.roll(self._history.frames, 1, axis=1)  # the policy takes in the newest observation itself
+        """See `Environments`; policy and returned trajectories use rows with histories."""
+        before = np.roll(self._history.frames, 1, axis=1)  # the policy appends the newest observation itself
         past = Past(before, np.zeros(self.num_envs, np.bool_))
         found: Trajectories = self.venv.roll(replace(rollout_policy, past=past), steps)
         rows = np.empty((steps + 1, self.num_envs, *self.observation_space.shape), np.float32)
@@ -52,7 +52,7 @@ class HistoryEnvironments(VecEnvWrapper):  # type: ignore[misc]
         return replace(found, observation=rows, cut_observation=last)
 
     def _last_row(self, index: int, last: NDArray[np.float32]) -> NDArray[np.float32]:
-        """The row of an environment whose episode ends with an observation."""
+        """Row with history for the `last` observation of an episode in environment `index`."""
         past = self._history.frames[index, 1:].ravel()
         return np.concatenate([past, last]).astype(np.float32)
 
@@ -60,15 +60,15 @@ class HistoryEnvironments(VecEnvWrapper):  # type: ignore[misc]
         return self._beside(self._history.push(row[:, : self._size], starts), row)
 
     def _beside(self, frames: NDArray[np.float32], row: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Histories with s_priv behind."""
+        """Rows of histories followed by s_priv."""
         return np.concatenate([frames.reshape(len(row), -1), row[:, self._size :]], axis=1)
 
     def statistics(self) -> dict[str, float]:
-        """Figures since the last call."""
+        """Statistics since the last call."""
         return self.venv.statistics()
 
     def state(self) -> dict[str, NDArray[Any]]:
-        """Everything that the future depends on."""
+        """Complete state, for a checkpoint."""
         own: dict[str, NDArray[Any]] = self.venv.state()
         return own | {"history": self._history.frames.copy()}
 

@@ -1,4 +1,4 @@
-"""The networks of teacher and student, with their observation normalisation inside."""
+"""Networks of teacher and student, including observation normalisation."""
 
 from collections.abc import Sequence
 from typing import Any, cast
@@ -13,25 +13,25 @@ from iowbc.learning.symmetric import SymmetricMlp, paired
 from iowbc.robot.mirror import MirrorMap, side_by_side
 
 Mirrors = tuple[MirrorMap, MirrorMap]
-"""Of an input and of an output."""
+"""Mirror maps of an input and an output."""
 
 
 def perceptron(
     inputs: int, hidden: Sequence[int], outputs: int, activation: str, mirrors: Mirrors | None
 ) -> VectorPerceptron:
-    """A multilayer perceptron that commutes with the mirrors of its input and output, where they are given."""
+    """Multilayer perceptron; if mirrors are given, it commutes with them."""
     if mirrors is None:
         return DenseMlp(inputs, hidden, outputs, activation)
     return SymmetricMlp(mirrors[0], hidden, mirrors[1], activation)
 
 
 def mirror_as_json(mirror: MirrorMap) -> dict[str, list[float]]:
-    """A mirror as plain values, read back by `mirror_from_json`."""
+    """Mirror as JSON values; inverse of `mirror_from_json`."""
     return {"permutation": mirror.permutation.tolist(), "sign": np.asarray(mirror.sign).tolist()}
 
 
 def mirrors_as_json(mirrors: Mirrors, symmetry: str) -> Any:
-    """Both mirrors as plain values, where networks are symmetric by construction."""
+    """Both mirrors as JSON values if networks are symmetric by construction, else None."""
     return [mirror_as_json(mirror) for mirror in mirrors] if symmetry == "construction" else None
 
 
@@ -61,7 +61,7 @@ class Normalizer(nn.Module):
         return torch.clamp((x - self.mean) / self.std, -self.clip, self.clip)
 
     def newest(self, rows: Any) -> Any:
-        """The part of rows that the statistics are of, (..., size): here all."""
+        """Part of rows described by the statistics, shape (..., size): here all."""
         return rows
 
 
@@ -90,7 +90,7 @@ class TeacherNetwork(nn.Module):
 
 
 def swap(pairs: int) -> MirrorMap:
-    """Mirror of a latent whose halves the mirror swaps, (2 pairs,)."""
+    """Mirror that swaps the halves of a latent, shape (2 pairs,)."""
     places = np.arange(2 * pairs)
     return MirrorMap(np.roll(places, pairs), np.ones(2 * pairs, np.float32))
 
@@ -98,8 +98,8 @@ def swap(pairs: int) -> MirrorMap:
 class StudentNetwork(nn.Module):
     """Mean action of the student: the history H_t, shape (n, K, S), oldest first, to a, shape (n, A).
 
-    An encoder turns the history into a latent of what the load does to the robot; the body sees it, or the s_priv that
-    is read from it, beside the newest observation.
+    An encoder turns the history into a latent that describes the load's effect on the robot. The body receives the
+    newest observation and either the latent or an estimate of s_priv from it.
     """
 
     log_std: Tensor
@@ -118,10 +118,10 @@ class StudentNetwork(nn.Module):
         mirrors: Any = None,
         privileged: Any = None,
     ) -> None:
-        """`observation`: size of what it sees of s_t, which may end before the object's pose. `mirrors`: of observation
-        and action, as `mirror_as_json` gives them; the network then commutes with them.
+        """`observation`: size of the visible part of s_t, which may end before the object's pose. `mirrors`: of
+        observation and action, from `mirror_as_json`; the network then commutes with them.
 
-        `privileged`: mirror of s_priv, where the body is to see an estimate of it: what a teacher's body sees.
+        `privileged`: mirror of s_priv if the body receives an estimate of s_priv, otherwise None.
         """
         super().__init__()
         del encoder  # named in the architectures of earlier versions, which had others, too

@@ -1,4 +1,4 @@
-"""Running statistics by which observations and rewards are normalised in training."""
+"""Normalisation of observations and rewards by running statistics in training."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -13,7 +13,7 @@ from iowbc.learning.networks import Normalizer
 from iowbc.robot.mirror import MirrorMap
 
 VARIANCE_FLOOR = 1e-4
-"""Added to variances: an input that hardly moves in training is not blown up when it does."""
+"""Added to variances, so that an input that is almost constant in training is not amplified when it changes."""
 LARGEST_REWARD = 10.0
 """Normalised rewards are clipped to this."""
 
@@ -33,27 +33,27 @@ class SymmetricMeanStd(RunningMeanStd):  # type: ignore[misc]
 
 
 class Normalization:
-    """Mean and variance of observations, and the variance of the discounted return that rewards are divided by."""
+    """Mean and variance of observations, and variance of the discounted return, which scales rewards."""
 
     def __init__(self, observations: int, environments: int, discount: float, mirror: MirrorMap | None) -> None:
-        """`mirror`: of the observations, where normalising is to commute with it."""
+        """`mirror`: of the observations if normalisation must commute with it, else None."""
         self.observations = RunningMeanStd(shape=(observations,)) if mirror is None else SymmetricMeanStd(mirror)
         self.returns = RunningMeanStd(shape=())
         self.discount = discount
         self.discounted = np.zeros(environments)
         """Σ discount^k · reward of each environment's episode so far."""
         self.frozen = False
-        """True while the statistics of observations are kept as they are."""
+        """True while no statistics are updated."""
         self.inherited: tuple[NDArray[np.float32], NDArray[np.float32]] | None = None
-        """Mean and standard deviation of the first inputs, where a trained policy came with them: they stay."""
+        """Fixed mean and standard deviation of the first inputs, from a trained policy, or None."""
 
     def observe(self, observations: NDArray[np.float32]) -> None:
-        """Take observations, (n, size), into account."""
+        """Update the statistics with observations, (n, size)."""
         if not self.frozen:
             self.observations.update(observations)
 
     def move(self, normalizer: Normalizer) -> None:
-        """Let the normaliser use what is known by now."""
+        """Copy the current statistics to the normaliser."""
         normalizer.mean.copy_(torch.from_numpy(self.observations.mean))
         normalizer.std.copy_(torch.from_numpy(np.sqrt(self.observations.var + VARIANCE_FLOOR)))
         if self.inherited is not None:
@@ -62,7 +62,7 @@ class Normalization:
             normalizer.std[: len(std)] = torch.from_numpy(std)
 
     def reward(self, rewards: NDArray[np.float32], ended: NDArray[np.bool_]) -> NDArray[np.float32]:
-        """Rewards (n,) of a step in standard deviations of the return; `ended`: environments whose episode ends."""
+        """Rewards of a step, (n,), in standard deviations of the return; `ended`: where an episode ends."""
         self.discounted = self.discounted * self.discount + rewards
         if not self.frozen:
             self.returns.update(self.discounted)
@@ -71,7 +71,7 @@ class Normalization:
         return np.asarray(np.clip(scaled, -LARGEST_REWARD, LARGEST_REWARD), np.float32)
 
     def arrays(self) -> Arrays:
-        """Everything, for a checkpoint; `frozen` follows from the step."""
+        """State for a checkpoint, except `frozen`, which follows from the step."""
         moments = {"observation": self.observations, "return": self.returns}
         inherited = {} if self.inherited is None else {"inherited": np.stack(self.inherited)}
         return {

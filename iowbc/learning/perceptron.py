@@ -1,4 +1,4 @@
-"""Multilayer perceptrons in the parts in which a learner calls them."""
+"""Multilayer perceptrons, split into the parts that a learner calls."""
 
 import itertools
 from abc import ABC, abstractmethod
@@ -14,13 +14,13 @@ Hidden = tuple[Tensor, ...]
 
 
 class Perceptron(nn.Module, ABC):
-    """(..., inputs) to (..., outputs): `head` after `hidden` after `prepare`.
+    """(..., inputs) to (..., outputs): `prepare`, then `hidden`, then `head`.
 
-    A learner prepares a sample once and sees it many times; it may compute `hidden` in less precision.
+    A learner prepares a sample once and uses it many times; it may compute `hidden` in reduced precision.
     """
 
     def prepare(self, x: Tensor) -> Tensor:
-        """The input as the first layer takes it, of the same shape."""
+        """Input of the first layer, in the shape of `x`."""
         return x
 
     @abstractmethod
@@ -40,18 +40,18 @@ class Perceptron(nn.Module, ABC):
 
 
 class VectorPerceptron(Perceptron):
-    """A perceptron of a vector, some of whose inputs can be hidden from it."""
+    """Perceptron of a vector whose inputs can be masked."""
 
     seen: Tensor | None
-    """1 for each prepared input that the first layer sees and 0 for the others; None sees all."""
+    """Mask of the prepared inputs: 1 for those that the first layer receives, else 0. None: no mask."""
 
     def __init__(self) -> None:
         super().__init__()
         self.register_buffer("seen", None, persistent=False)
 
     def hide(self, inputs: Sequence[int]) -> None:
-        """From now on these inputs decide nothing: they are not seen, and what has learnt without them has no weights
-        for them. Raises ValueError where the first layer cannot see one input without another."""
+        """Mask these inputs from now on and set their weights to zero. Raises ValueError if an input cannot be masked
+        without another."""
         self.seen, weights = self._without(inputs)
         with torch.no_grad():
             for weight, seen in weights:
@@ -59,10 +59,10 @@ class VectorPerceptron(Perceptron):
 
     @abstractmethod
     def _without(self, inputs: Sequence[int]) -> tuple[Tensor, list[tuple[Tensor, Tensor]]]:
-        """1 and 0 for prepared inputs, and for those of each weight of the first layer."""
+        """Mask of the prepared inputs, and each weight of the first layer with the mask of its inputs."""
 
     def looked_at(self, prepared: Tensor) -> Tensor:
-        """Of what was prepared what the first layer sees."""
+        """Prepared inputs with the mask applied."""
         return prepared if self.seen is None else prepared * self.seen
 
 
@@ -75,7 +75,7 @@ def mlp(sizes: Sequence[int], activation: str) -> nn.Sequential:
 
 
 class DenseMlp(VectorPerceptron):
-    """A perceptron that knows no symmetry."""
+    """Perceptron without symmetry."""
 
     def __init__(self, inputs: int, hidden: Sequence[int], outputs: int, activation: str) -> None:
         super().__init__()

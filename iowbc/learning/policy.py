@@ -1,4 +1,4 @@
-"""Policy and value network in stable-baselines3's terms."""
+"""Policy and value network as a stable-baselines3 policy."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -15,17 +15,17 @@ from iowbc.learning.perceptron import Perceptron, VectorPerceptron
 from iowbc.robot.mirror import MirrorMap
 
 INVARIANT = MirrorMap(np.zeros(1, np.int64), np.ones(1, np.float32))
-"""Mirror of the value: a state and its mirror image are worth the same."""
+"""Mirror of the value: a state and its mirror image have the same value."""
 HIDDEN_GAIN, POLICY_GAIN, VALUE_GAIN = float(np.sqrt(2.0)), 0.01, 1.0
-"""Gains of the orthogonal weights at the start, as stable-baselines3 has them: the policy starts as the reference."""
+"""Gains of the initial orthogonal weights, as in stable-baselines3. The policy starts close to the reference."""
 
 
 class ActorCritic(ActorCriticPolicy):  # type: ignore[misc]
-    """A Gaussian policy and a value, each a network of its own, over observations that are normalised inside.
+    """Gaussian policy and value function with separate networks and built-in normalisation of observations.
 
-    With mirrors both commute with them: the mean is mirrored with the observation, the standard deviation is the same
-    on both sides, and the value stays. With the architecture of a student the policy is its network, on rows of H_t
-    with s_priv behind; the value sees the newest (s_t, s_priv).
+    With mirrors, both commute with them: the mean is mirrored with the observation, the standard deviation is equal on
+    both sides, and the value is unchanged. With a student's architecture, the policy is the student's network on rows
+    of H_t followed by s_priv; the value network receives the newest (s_t, s_priv).
     """
 
     def __init__(
@@ -44,8 +44,8 @@ class ActorCritic(ActorCriticPolicy):  # type: ignore[misc]
         student: Mapping[str, Any] | None = None,
         use_sde: bool = False,
     ) -> None:
-        """`mirrors`: as `TeacherNetwork` takes them; `value_only`: places of an observation that the policy does not
-        see; `student`: arguments of `StudentNetwork`, which sees none of s_priv."""
+        """`mirrors`: as in `TeacherNetwork`; `value_only`: indices of observations for the value network only;
+        `student`: arguments of `StudentNetwork`, which receives none of s_priv."""
         super().__init__(observation_space, action_space, lr_schedule, net_arch=[], use_sde=use_sde)
         (inputs,), (actions,) = observation_space.shape, action_space.shape
         both = mirrors_from_json(mirrors)
@@ -68,7 +68,7 @@ class ActorCritic(ActorCriticPolicy):  # type: ignore[misc]
         self.hide()
         place = std_places(actions, None if both is None else both[1])
         self.log_stds = nn.Parameter(torch.full((place.max() + 1,), float(np.log(initial_std))))
-        """One for each pair of actions that the mirror swaps, and one for each other."""
+        """One per pair of actions that the mirror swaps, and one per remaining action."""
         self.register_buffer("std_place", torch.from_numpy(place), persistent=False)
         rate = lr_schedule(1)
         self.optimizer = torch.optim.Adam(
@@ -82,10 +82,10 @@ class ActorCritic(ActorCriticPolicy):  # type: ignore[misc]
         )
 
     def _build(self, lr_schedule: Any) -> None:
-        """Nothing of stable-baselines3's own networks."""
+        """Build none of stable-baselines3's own networks."""
 
     def hide(self) -> None:
-        """Takes the weights from what only the value is to see, where the policy is a network of s_t and s_priv."""
+        """Mask the `value_only` inputs of a policy on s_t and s_priv."""
         if self._value_only and isinstance(self.actor, VectorPerceptron):
             self.actor.hide(self._value_only)
 
@@ -95,11 +95,11 @@ class ActorCritic(ActorCriticPolicy):  # type: ignore[misc]
         return self.log_stds[self.std_place]
 
     def finite(self) -> bool:
-        """True where every parameter is a number."""
+        """True if every parameter is finite."""
         return all(bool(torch.isfinite(parameter).all()) for parameter in self.parameters())
 
     def prepared(self, observations: Tensor) -> Tensor:
-        """Observations (n, S) as both networks take them in training: normalised, in their mirror basis."""
+        """Observations, (n, S), as inputs of both networks in training: normalised, in their mirror basis."""
         return self.actor.prepare(self.normalizer(observations))
 
     def forward(self, obs: Tensor, deterministic: bool = False) -> tuple[Tensor, Tensor, Tensor]:

@@ -1,9 +1,9 @@
-"""PPO on whole rollouts: few copies, and a true KL divergence.
+"""PPO on whole rollouts, with few copies and the exact KL divergence.
 
-Its policy is one of stable-baselines3, and so is the zip that a training leaves. Differences from that library's PPO:
-the networks see a sample in a prepared form that is made once; values of a whole rollout are computed at once; the KL
-divergence is that of the two Gaussians, not a sampled estimate, whose heavy tail would starve the step size; no update
-ends early on it; the standard deviation has a step size and bounds of its own.
+The policy class and the saved zip are those of stable-baselines3. Differences from that library's PPO: samples are
+prepared once for all epochs; values of a whole rollout are computed at once; the KL divergence is that of the two
+Gaussians, not a sampled estimate, whose heavy tail would shrink the learning rate; no update stops early because of the
+KL divergence; the standard deviation has its own learning rate and bounds.
 """
 
 import copy
@@ -36,12 +36,13 @@ from iowbc.rollouts.rollout_policies import ExploringPolicy
 from iowbc.rollouts.trajectories import Trajectories
 
 FIGURES = ("policy_loss", "value_loss", "kl", "approx_kl", "clip_share")
-"""Means over minibatches: of all, and of the last epoch's for the two divergences."""
+"""Means over all minibatches; over those of the last epoch for the two divergences."""
 
 
 class Learner:
-    """The learner of a recipe on a vector environment with raw observations and rewards. Starts as the reference itself
-    (the mean action begins near zero). `collect` and `train`, in turn, are an update.
+    """PPO learner on a vector environment with raw observations and rewards. One update is `collect`, then `train`.
+
+    The initial mean action is near zero, so that the robot follows the reference.
     """
 
     def __init__(
@@ -54,8 +55,8 @@ class Learner:
         value_only: Sequence[int] = (),
         device: str = "cpu",
     ) -> None:
-        """`mirrors`: of observation and action; `cores`: on which the networks learn; `value_only`: places of an
-        observation that the policy does not see; `device`: of the networks, as torch names it."""
+        """`mirrors`: of observation and action; `cores`: for network updates; `value_only`: indices of observations
+        for the value network only; `device`: torch device of the networks."""
         set_random_seed(seed)
         env.seed(seed)
         self.settings, self.env, self.device = teacher, env, torch.device(device)
@@ -79,17 +80,17 @@ class Learner:
         """Environment steps made so far."""
         self.learning_rate = teacher.learning_rate
         self.explained = 0.0
-        """Share of the targets' variance that the values of the last rollout foresaw."""
+        """Explained variance of the value targets of the last rollout."""
         self.seconds = dict.fromkeys(("simulation", "inference", "learning"), 0.0)
-        """Time spent since they were last set back [s]."""
+        """Time per part since the last reset [s]."""
         self.caution = 1.0
         """Factor of the desired KL divergence."""
         self.value_alone = 0
-        """Environment steps up to which the value network alone learns; the optimiser's moments of the policy follow
-        its gradients, its step size is zero."""
+        """Environment steps up to which only the value network learns. The policy's learning rate is zero until then,
+        but the optimiser's moments follow its gradients."""
 
     def save_for_sb3(self, path: Path) -> None:
-        """Leave a zip that stable-baselines3's `PPO.load` reads, for users' own code."""
+        """Write a zip that stable-baselines3's `PPO.load` reads, for users' own code."""
         settings = self.settings
         model = PPO(
             ActorCritic,
@@ -123,8 +124,7 @@ class Learner:
         self.seconds[part] += time.perf_counter() - begin
 
     def collect(self) -> None:
-        """One rollout into the samples. The environments make the whole of it themselves; what they saw before it moves
-        the normalisation of this one."""
+        """Collect one rollout into the samples. Its observations are normalised by statistics of earlier rollouts."""
         policy, env, settings = self.policy, self.env, self.settings
         if self.observation is None:
             self.observation = env.reset()
@@ -143,7 +143,7 @@ class Learner:
             self._look_back(found)
 
     def _look_back(self, found: Trajectories) -> None:
-        """Add what policy and value were during a rollout, and its advantages."""
+        """Add the policy's outputs, values and advantages of a rollout to the samples."""
         samples, settings, shape = self.samples, self.settings, found.reward.shape
         columns = samples.columns
         rows = found.observation[:-1].reshape(shape[0] * shape[1], -1)
@@ -171,7 +171,7 @@ class Learner:
             return self.policy.prepared(rows)
 
     def _judge(self, samples: Tensor) -> None:
-        """Writes the policy's mean, the density of the action and the value into rows of samples."""
+        """Write the policy's mean, the log density of the action and the value into rows of samples."""
         policy, own = self.policy, self.samples.named(samples)
         with torch.inference_mode():
             with reduced(self.settings.precision):
@@ -181,14 +181,14 @@ class Learner:
             own["value"].copy_(policy.critic.head(policy.critic.hidden(own["observation"]))[:, 0])
 
     def explore_anew(self) -> None:
-        """Brings exploration back where the recipe's restart comes before the next update, and only there."""
+        """Reset the standard deviation once, before the first update after the recipe's restart step."""
         restart, passed = self.settings.restart, self.steps - self.settings.rollout * self.env.num_envs
         if restart is not None and passed < restart.after <= self.steps:
             with torch.no_grad():
                 self.policy.log_stds.fill_(float(np.log(restart.std)))
 
     def train(self) -> dict[str, float]:
-        """Gradient steps on the samples; returns their figures."""
+        """Gradient steps on the samples; returns their statistics."""
         with self._timed("learning"):
             return self._train()
 
@@ -253,7 +253,7 @@ class Learner:
         value_loss = torch.nn.functional.mse_loss(value, samples["target"])
         loss = policy_loss + settings.value_weight * value_loss - settings.entropy * entropy(log_std)
         if settings.smoothness:
-            std = log_std.detach()  # smoother by its mean, not by more noise
+            std = log_std.detach()  # smoothness must come from the mean, not from more noise
             loss = loss + settings.smoothness * divergence(samples["neighbours"], std, mean, std).mean()
         with torch.no_grad():
             kl = divergence(samples["mean"], before, mean, log_std).mean()
@@ -263,14 +263,14 @@ class Learner:
         return loss, figures
 
     def _bound_deviation(self) -> None:
-        """Keeps the standard deviation below its ceiling, which falls with the steps, and above its floor."""
+        """Clamp the standard deviation between its floor and its ceiling, which decays with the steps."""
         low, high = deviation_bounds(self.settings, self.steps)
         with torch.no_grad():
             self.policy.log_stds.clamp_(float(np.log(low)), float(np.log(high)))
 
 
 def _policy_arguments(teacher: Teacher, env: Any, mirrors: Mirrors, value_only: Sequence[int]) -> dict[str, Any]:
-    """Arguments of `ActorCritic` beside its spaces and step size."""
+    """Arguments of `ActorCritic` other than its spaces and learning rate."""
     student = None
     if teacher.history is not None:
         size = env.observation_space.shape[0] - len(mirrors[0])
@@ -289,7 +289,7 @@ def _policy_arguments(teacher: Teacher, env: Any, mirrors: Mirrors, value_only: 
 
 
 def deviation_bounds(teacher: Teacher, steps: int) -> tuple[float, float]:
-    """Least and largest standard deviation of the action after some environment steps."""
+    """Bounds of the action's standard deviation after `steps` environment steps."""
     restart = teacher.restart
     if restart is not None and steps >= restart.after:
         ceiling = restart.std * 0.5 ** ((steps - restart.after) / restart.half_life)
@@ -301,10 +301,8 @@ def deviation_bounds(teacher: Teacher, steps: int) -> tuple[float, float]:
 
 
 def adapted(rate: float, kl: float, settings: Teacher | SkillLearning, caution: float = 1.0) -> float:
-    """The next update's step size: a fifth less or more where the KL divergence was far from the desired one.
-
-    `caution`: what the desired divergence is multiplied by.
-    """
+    """Learning rate of the next update: 20 % lower or higher if the KL divergence is over or under the desired one by
+    more than a factor of 1.5, within `learning_rate_range`. `caution`: factor of the desired divergence."""
     if settings.desired_kl is None:
         return rate
     desired = caution * settings.desired_kl
@@ -317,5 +315,5 @@ def adapted(rate: float, kl: float, settings: Teacher | SkillLearning, caution: 
 
 
 def explained_variance(values: Tensor, targets: Tensor) -> float:
-    """Share of the targets' variance that the values foresaw; 1 is all of it, below 0 is worse than their mean."""
+    """Fraction of the targets' variance explained by the values: 1 is perfect, below 0 is worse than their mean."""
     return float(1.0 - (targets - values).var() / (targets.var() + 1e-8))

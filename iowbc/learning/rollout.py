@@ -1,4 +1,4 @@
-"""Samples of a rollout for learning: one row of float32 numbers each, and their advantages."""
+"""Training samples of a rollout, each a row of float32 numbers, and their advantages."""
 
 from typing import Any
 
@@ -9,15 +9,14 @@ from torch import Tensor
 from iowbc.arrays import Array, Mask
 
 SINGLE = ("log_density", "value", "advantage", "target")
-"""Columns of one number."""
+"""Scalar columns."""
 
 
 class Samples:
     """Samples of T steps of n environments as rows, so that an epoch shuffles them with a single gather.
 
-    `columns` are views of the rows by name: the prepared observation, the action, the policy's mean, the mean of its
-    neighbours in time, density and value before the update, and the advantage and target that are learnt from. Each
-    rollout overwrites the one before.
+    `columns` are views of the rows by name: prepared observation, action, the policy's mean, mean of its neighbours in
+    time, log density and value before the update, advantage and value target. Each rollout overwrites the previous one.
     """
 
     def __init__(
@@ -31,7 +30,7 @@ class Samples:
         self.columns = self.named(self.rows)
 
     def named(self, rows: Tensor) -> dict[str, Tensor]:
-        """Views of rows (..., width) by the name of the columns; single columns without their axis."""
+        """Views of rows (..., width) by column name; scalar columns drop the last axis."""
         views = {name: rows[..., place] for name, place in self.places.items()}
         return {name: view[..., 0] if name in SINGLE else view for name, view in views.items()}
 
@@ -41,7 +40,7 @@ class Samples:
         return self.rows.view(-1, self.rows.shape[-1])
 
     def finish(self, rewards: Array, ended: Mask, last_value: Array, discount: float, decay: float) -> None:
-        """Add advantages and targets; arguments as of `advantages`."""
+        """Add advantages and targets; arguments as in `advantages`."""
         values = self.columns["value"].cpu().numpy()
         found = advantages(rewards, ended, values, last_value, discount, decay)
         self.columns["advantage"].copy_(torch.from_numpy(found))
@@ -49,9 +48,10 @@ class Samples:
 
 
 def neighbours(means: Tensor, ended: Mask) -> Tensor:
-    """Mean of the policy's means one step before and one after, (T, n, A); at the ends of rollout and episodes its own.
+    """Average of the policy's means one step before and after, (T, n, A).
 
-    means: (T, n, A); ended: (T, n), where an episode ended with the step.
+    At the ends of rollout and episodes, the mean itself. means: (T, n, A); ended: (T, n), where an episode ended with
+    the step.
     """
     found, goes_on = means.clone(), torch.from_numpy(~ended).to(means.device)
     inside = (goes_on[:-2] & goes_on[1:-1])[..., None]
@@ -63,8 +63,8 @@ def advantages(rewards: Array, ended: Mask, values: Array, last_value: Array, di
     """Generalised advantage estimates (Schulman et al. 2016, eq. 16), (T, n).
 
     rewards, values: (T, n), the value before each step; ended: (T, n), where an episode ended with the step;
-    last_value: (n,), behind the last step. Nothing passes from one episode to the one before: where an episode was cut
-    off by its time limit, the reward of its last step must hold the discounted value of what it was cut off from.
+    last_value: (n,), after the last step. Nothing is carried across episode ends: if an episode was truncated by its
+    time limit, the reward of its last step must include the discounted value of the next state.
     """
     found: Any = np.zeros_like(rewards)
     carried, following = np.zeros_like(last_value), last_value

@@ -1,4 +1,4 @@
-"""Trained networks on disk: safetensors for the numbers, JSON for the architecture; nothing is unpickled."""
+"""Trained networks on disk: safetensors for the weights, JSON for the architecture, no pickle."""
 
 import json
 from pathlib import Path
@@ -11,15 +11,15 @@ from iowbc.learning.networks import StudentNetwork, TeacherNetwork
 
 Network = TeacherNetwork | StudentNetwork
 KINDS: dict[str, type[Network]] = {"teacher": TeacherNetwork, "student": StudentNetwork}
-"""By what a policy sees: s_t with s_priv, or H_t."""
+"""Network classes by kind: a teacher receives s_t and s_priv, a student H_t."""
 NAMES = ("teacher", "student")
-"""Of the files that the stages `teacher` and `distill` leave."""
+"""Base names of the files written by the stages `teacher` and `distill`."""
 
 
 def save_network(
     network: Network, architecture: dict[str, Any], folder: Path, name: str, about: dict[str, Any]
 ) -> None:
-    """Write `<name>.safetensors` and `<name>.json` (its kind, the constructor's arguments and what else to know)."""
+    """Write `<name>.safetensors` and `<name>.json` (kind, constructor arguments and the entries of `about`)."""
     save_file({key: value.contiguous() for key, value in network.state_dict().items()}, folder / f"{name}.safetensors")
     kind = next(kind for kind, made in KINDS.items() if isinstance(network, made))
     text = json.dumps({"kind": kind, "architecture": architecture, **about}, indent=1)
@@ -27,7 +27,7 @@ def save_network(
 
 
 def load_network(folder: Path) -> tuple[Network, dict[str, Any]]:
-    """Read what `save_network` wrote in a stage's artifact; returns the network in evaluation mode and the JSON."""
+    """Load the network of a stage's artifact; returns it in evaluation mode, and the JSON."""
     path = next((folder / f"{name}.json" for name in NAMES if (folder / f"{name}.json").is_file()), None)
     if path is None:
         found = sorted(p.name for p in folder.glob("*.json"))
@@ -37,7 +37,7 @@ def load_network(folder: Path) -> tuple[Network, dict[str, Any]]:
 
 
 def read_network(folder: Path, name: str) -> tuple[Network, dict[str, Any]]:
-    """Read what `save_network` wrote under a name; returns the network in evaluation mode and the JSON."""
+    """Load a network by name; returns it in evaluation mode, and the JSON."""
     about = json.loads((folder / f"{name}.json").read_text())
     network = KINDS[about["kind"]](**about["architecture"])
     network.load_state_dict(load_file(folder / f"{name}.safetensors"))
@@ -53,14 +53,14 @@ def load_teacher(folder: Path) -> tuple[TeacherNetwork, dict[str, Any]]:
 
 
 def read_teacher(folder: Path, name: str) -> TeacherNetwork:
-    """The network of one observation that `save_network` wrote under a name."""
+    """Load a teacher's network by name."""
     network, _ = read_network(folder, name)
     assert isinstance(network, TeacherNetwork)
     return network
 
 
 def load_student_network(folder: Path) -> tuple[StudentNetwork, dict[str, Any]]:
-    """The student in a stage's artifact. Raises StageFailed for a policy that is none."""
+    """The student in a stage's artifact. Raises StageFailed if the policy is not a student."""
     network, about = load_network(folder)
     if not isinstance(network, StudentNetwork):
         raise StageFailed(

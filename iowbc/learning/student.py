@@ -1,4 +1,4 @@
-"""The student's training, one round of DAgger at a time: it drives, the teacher says what it would have done."""
+"""Student training by DAgger: the student acts, the teacher labels its states with target actions."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -25,16 +25,16 @@ from iowbc.rollouts.rollout_policies import DaggerPolicy, Past
 
 @dataclass(frozen=True)
 class Rows:
-    """Places in a row of the environments, and mirrors of them."""
+    """Layout of an observation row of the environments, and mirrors of its parts."""
 
     observation: slice
-    """The student's part of s_t, with which the row begins."""
+    """The student's part of s_t, at the start of the row."""
     privileged: slice
     """The teacher's part: the rest of s_t, and s_priv."""
     facts: NDArray[np.int64]
-    """Places of what is to be read from the latent."""
+    """Indices of the auxiliary targets, which are predicted from the latent."""
     withheld: NDArray[np.int64]
-    """Places in `privileged` of what is masked from the teacher."""
+    """Indices in `privileged` that are masked from the teacher."""
     observation_mirror: MirrorMap
     privileged_mirror: MirrorMap
     facts_mirror: MirrorMap
@@ -42,7 +42,7 @@ class Rows:
 
 
 class StudentTraining:
-    """On-policy distillation. Between two rounds `arrays` holds all that the rest of it depends on."""
+    """On-policy distillation. Between two rounds, `arrays` is its complete state."""
 
     def __init__(
         self,
@@ -55,8 +55,9 @@ class StudentTraining:
         symmetry: Symmetry,
         seed: int,
     ) -> None:
-        """`teacher_of`: place of each environment's teacher, (n,); `architecture`: arguments that rebuild the first of
-        them, whose body and normalisation the student begins with; `symmetry`: as the teachers'."""
+        """`teacher_of`: index of each environment's teacher, (n,); `architecture`: arguments that rebuild the first
+        teacher; `symmetry`: of the teachers. The student takes over the first teacher's normalisation and, if
+        `settings.start` is "teacher", its body."""
         torch.manual_seed(seed)
         self.settings, self.environments, self.rows, self.symmetry = settings, environments, rows, symmetry
         self.teachers, self.teacher_of = tuple(map(teacher_policy, teachers)), teacher_of
@@ -103,7 +104,7 @@ class StudentTraining:
 
     @property
     def planned(self) -> int:
-        """Environment steps after which the training is done, in whole rounds."""
+        """Environment steps of the whole training, rounded up to whole rounds."""
         return self._planned_rounds * self._steps_a_round
 
     @property
@@ -115,7 +116,7 @@ class StudentTraining:
         return -(-self.settings.steps // self._steps_a_round)
 
     def update(self) -> dict[str, float]:
-        """One round: a rollout and its gradient steps; returns the figures of both."""
+        """One round: a rollout and its gradient steps; returns the statistics of both."""
         settings, progress = self.settings, self.rounds / self._planned_rounds
         share = max(0.0, 1.0 - progress / settings.teacher_share) if settings.teacher_share else 0.0
         error, target_square = self._rollout(share)
@@ -134,7 +135,8 @@ class StudentTraining:
         }
 
     def _rollout(self, teacher_share: float) -> tuple[np.floating[Any], np.floating[Any]]:
-        """Lets the student drive, the teacher in its share; mean squares of student's error and teacher's action."""
+        """Rollout in which the teacher acts in its share of environments, the student in the others; returns the mean
+        squares of the student's error and of the teacher's action."""
         rows, history = self.rows, self.history
         if self.observation is None:
             self.observation = self.environments.reset()
@@ -161,7 +163,7 @@ class StudentTraining:
         return np.mean((found.records["own"] - targets) ** 2), np.mean(targets**2)
 
     def _gradient_step(self) -> dict[str, float]:
-        """One step, of a gradient no larger than the recipe's, down the loss; its figures as they were before."""
+        """One optimiser step with clipped gradient; returns the statistics of the loss before it."""
         histories, answers = self.experience.sample(self.settings.batch, self.random)
         if self.symmetry == "augment":
             answer_mirror = side_by_side((self.rows.action_mirror, self.rows.facts_mirror)).as_float32()
@@ -176,7 +178,7 @@ class StudentTraining:
         return figures
 
     def arrays(self) -> checkpoint.Arrays:
-        """Everything that a resumed training needs, between two rounds."""
+        """Complete state between two rounds, for a checkpoint."""
         assert self.observation is not None
         return {
             **checkpoint.prefixed("student", checkpoint.module_arrays(self.loss)),
@@ -191,7 +193,7 @@ class StudentTraining:
         }
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Inverse of `arrays`, on a training made from the same recipe."""
+        """Inverse of `arrays`, for a training with the same recipe."""
         checkpoint.restore_module(self.loss, checkpoint.under("student", arrays))
         checkpoint.restore_optimizer(self.optimizer, checkpoint.under("optimizer", arrays))
         self.experience.restore(checkpoint.under("experience", arrays))

@@ -1,9 +1,9 @@
 """Networks that commute with the left-right mirror by construction.
 
-Hidden units come in pairs (a, b) that the mirror swaps. A linear layer that commutes with it is two products of half
-the size in the basis of sums a + b, which the mirror keeps, and differences a - b, which it negates; only the sums have
-a bias. An activation acts on a and b themselves, for of a difference it would make something that is not odd. The law
-holds to the last bits and everywhere, not only where training has been.
+Hidden units come in pairs (a, b) that the mirror swaps. In the basis of sums a + b, which the mirror keeps, and
+differences a - b, which it negates, an equivariant linear layer is two products of half the size; only the sums have a
+bias. Activations act on a and b themselves: applied to a difference, they would not be odd. The symmetry is exact up to
+rounding and holds for all inputs, not only for those seen in training.
 """
 
 import itertools
@@ -19,11 +19,11 @@ from iowbc.learning.perceptron import Hidden, VectorPerceptron
 from iowbc.robot.mirror import MirrorMap
 
 Parts = tuple[Tensor, Tensor]
-"""The part that the mirror keeps, and the part that it negates."""
+"""Even part, which the mirror keeps, and odd part, which it negates."""
 
 
 class MirrorBasis(nn.Module):
-    """The orthonormal basis of a vector's even part, which its mirror keeps, and its odd part, which it negates."""
+    """Orthonormal basis of the even and the odd part of a vector under its mirror."""
 
     matrix: Tensor
 
@@ -49,7 +49,7 @@ class MirrorBasis(nn.Module):
 
 
 def _eigenvectors(mirror: MirrorMap) -> tuple[list[Any], list[Any]]:
-    """Orthonormal vectors that the mirror keeps, and those that it negates."""
+    """Orthonormal eigenvectors of the mirror with eigenvalue +1, and those with -1."""
     permutation, sign = mirror.permutation, np.asarray(mirror.sign, np.float64)
     if np.any(permutation[permutation] != np.arange(len(sign))) or np.any(sign != sign[permutation]):
         raise ValueError(f"a mirror is its own inverse; this map is not: {permutation.tolist()}, {sign.tolist()}")
@@ -92,10 +92,10 @@ class SymmetricLayers(nn.Module):
 
 
 class SymmetricHead(nn.Module):
-    """A linear layer from sums and differences to an output with a mirror of its own."""
+    """Linear layer from sums and differences to an output with its own mirror."""
 
     def __init__(self, units: int, mirror: MirrorMap) -> None:
-        """`units`: of the layer before, an even number."""
+        """`units`: of the previous layer, an even number."""
         super().__init__()
         self.basis = MirrorBasis(mirror)
         self.even = nn.Linear(paired(units), self.basis.even) if self.basis.even else None
@@ -107,7 +107,7 @@ class SymmetricHead(nn.Module):
         return self.basis.inverse(even, odd)
 
     def initialize(self, gain: float) -> None:
-        """As `SymmetricLayers.initialize`."""
+        """See `SymmetricLayers.initialize`."""
         if self.even is not None:
             nn.init.orthogonal_(self.even.weight, gain / np.sqrt(2.0))
             nn.init.zeros_(self.even.bias)
@@ -116,7 +116,7 @@ class SymmetricHead(nn.Module):
 
 
 class SymmetricMlp(VectorPerceptron):
-    """A multilayer perceptron whose output is mirrored when its input is. It is prepared in its mirror basis."""
+    """Multilayer perceptron whose output is mirrored when its input is. `prepare` transforms to the mirror basis."""
 
     def __init__(self, inputs: MirrorMap, hidden: Sequence[int], outputs: MirrorMap, activation: str) -> None:
         super().__init__()
@@ -153,7 +153,7 @@ class SymmetricMlp(VectorPerceptron):
 
 
 def paired(units: int) -> int:
-    """Pairs in a layer. Raises ValueError where a unit is left over."""
+    """Number of pairs in a layer. Raises ValueError for an odd number of units."""
     if units % 2:
         raise ValueError(f"the mirror swaps hidden units in pairs, so that a layer has an even number, not {units}")
     return units // 2

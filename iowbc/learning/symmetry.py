@@ -17,15 +17,15 @@ def mirror_tensor(mirror: MirrorMap, x: Tensor) -> Tensor:
 
 
 class MirroredSamples:
-    """The mirror images of a rollout's samples.
+    """Mirror images of a rollout's samples.
 
-    Advantage and return are those of the original, for the task is symmetric. The old policy is what it was in the
-    mirrored state, so that the probability ratio begins at one. An action that the policy would hardly have taken there
-    is not shown: its gradient would grow without bound.
+    Advantage and return equal those of the original, since the task is symmetric. Mean and density are recomputed in
+    the mirrored state, so that the probability ratio starts at one. Images with a very unlikely action are not used:
+    their gradient would grow without bound.
     """
 
     def __init__(self, mirrors: Mirrors, gap: float) -> None:
-        """`mirrors`: of observation and action; `gap`: how much less likely an image may be than its original [nat]."""
+        """`mirrors`: of observation and action; `gap`: largest drop of log density from original to image [nat]."""
         self.mirrors, self.gap = mirrors, gap
 
     def images(self, samples: Samples, policy: ActorCritic) -> Tensor:

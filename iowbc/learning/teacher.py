@@ -1,4 +1,4 @@
-"""The teacher's training, one PPO update at a time (paper III-C)."""
+"""Teacher training by PPO (paper III-C)."""
 
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -20,17 +20,16 @@ from iowbc.learning.trained import take_over, trained_network
 from iowbc.recipe.teacher import Teacher
 
 FLOOR_REACHED = 1.01
-"""Standard deviations within this factor of their floor count as having arrived there."""
+"""A standard deviation within this factor of its floor counts as at the floor."""
 DEAD = 0.5
-"""Share of `std_end` below which a standard deviation at its floor no longer explores; a higher floor is meant to be
-reached."""
+"""Reaching a floor below this fraction of `std_end` counts as loss of exploration; a higher floor is intended."""
 
 Score = Callable[[Policy], Mapping[str, float]]
-"""Figures of a policy, `score` among them: the greater the better."""
+"""Evaluation of a policy: metrics that include `score`, higher is better."""
 
 
 class TeacherTraining:
-    """PPO with privileged information. Between two updates `arrays` holds all that the rest of it depends on."""
+    """PPO with privileged information. Between two updates, `arrays` is its complete state."""
 
     def __init__(
         self,
@@ -45,10 +44,9 @@ class TeacherTraining:
         score: Score | None = None,
         say: Callable[[str], None] = print,
     ) -> None:
-        """`mirrors`: of observation and action; `cores`: on which the networks learn while the environments rest;
-        `value_only`: places of an observation that the policy does not see; `device`: of the networks, as torch names
-        it; `score`: a fixed evaluation, by which the best policy is kept; `say`: is called when the training goes back.
-        """
+        """`mirrors`: of observation and action; `cores`: for network updates, while the environments are idle;
+        `value_only`: indices of observations for the value network only; `device`: torch device of the networks;
+        `score`: fixed evaluation that selects the best policy; `say`: receives a message at each rollback."""
         self.settings, self.environments, self.mirrors = settings, environments, mirrors
         self.score = score if settings.check.every is not None else None
         self.say = say
@@ -66,13 +64,13 @@ class TeacherTraining:
 
     @property
     def planned(self) -> int:
-        """Environment steps after which the training is done; the last update may pass them."""
+        """Environment steps of the whole training; the last update may exceed them."""
         return self.settings.steps
 
     def update(self) -> dict[str, float]:
-        """One rollout and its gradient steps, and every so often a check; returns their figures.
+        """One rollout with its gradient steps and, at the check interval, an evaluation; returns their statistics.
 
-        Where the networks are lost it goes back to the best policy. Raises StageFailed where that does not help.
+        Rolls back to the best policy after a collapse. Raises StageFailed after too many rollbacks.
         """
         model, begin = self.model, time.perf_counter()
         model.seconds = dict.fromkeys(model.seconds, 0.0)
@@ -88,7 +86,7 @@ class TeacherTraining:
         return figures | seconds | {"seconds/rest": rest}
 
     def _judged(self, training: Mapping[str, float]) -> dict[str, float]:
-        """The finite figures of an update and of its check; goes back where they say so."""
+        """Finite statistics of an update and its check; rolls back if they show a collapse."""
         figures = {name: value for name, value in training.items() if np.isfinite(value)}
         deviation = self.model.policy.log_std.detach().exp()
         why = ""
@@ -115,13 +113,13 @@ class TeacherTraining:
         return self.steps // (self.settings.environments * self.settings.rollout)
 
     def keep_best(self) -> None:
-        """Ends the training: what it has learnt is from now on what scored best, the last policy being scored, too."""
+        """End the training: score the last policy, then restore the best learner state."""
         if self.score is not None:
             self.best.offer(float(self.score(policy_of(*self.network()))["score"]), self._scored())
             self._learn_again(self.best.learner)
 
     def _learnt(self) -> Arrays:
-        """Everything that the learner has learnt: networks, optimiser, statistics."""
+        """State of the learner: networks, optimiser, normalisation statistics."""
         return {
             **prefixed("policy", checkpoint.module_arrays(self.model.policy)),
             **prefixed("optimizer", checkpoint.optimizer_arrays(self.model.policy.optimizer)),
@@ -129,11 +127,11 @@ class TeacherTraining:
         }
 
     def _acting(self) -> Arrays:
-        """Parameters and buffers of the policy, what acts being the mean of policies where there is one."""
+        """Parameters and buffers of the policy; its actor is the running average of policies if there is one."""
         return checkpoint.module_arrays(self.model.policy) | ({} if self.average is None else self.average.arrays)
 
     def _scored(self) -> Arrays:
-        """The same with the policy that a check scores."""
+        """State of the learner with the policy of `_acting`, which checks score."""
         return {**self._learnt(), **prefixed("policy", self._acting())}
 
     def _learn_again(self, learnt: Mapping[str, NDArray[Any]]) -> None:
@@ -145,7 +143,7 @@ class TeacherTraining:
         self.model.normalization.restore(under("normalization", learnt))
 
     def arrays(self) -> Arrays:
-        """Everything that a resumed training needs, between two updates."""
+        """Complete state between two updates, for a checkpoint."""
         model = self.model
         assert model.observation is not None, "arrays() comes after an update"
         return {
@@ -160,10 +158,10 @@ class TeacherTraining:
         }
 
     def begin(self, network: Network) -> None:
-        """Starts from a trained policy, with the statistics that it was trained with, which stay, and with the least
-        step size where that may move: what is trained is soon led astray.
+        """Start from a trained policy and keep its normalisation statistics fixed. An adaptive learning rate starts at
+        its minimum, since larger steps soon spoil a trained policy.
 
-        Raises StageFailed where its networks are of another shape.
+        Raises StageFailed if its networks have another architecture.
         """
         model = self.model
         try:
@@ -182,7 +180,7 @@ class TeacherTraining:
         self.best = Best(self.settings.check, self._learnt())
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Inverse of `arrays`, on a training made from the same recipe."""
+        """Inverse of `arrays`, for a training with the same recipe."""
         model = self.model
         self._learn_again(arrays)
         if self.average is not None:

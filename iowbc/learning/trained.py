@@ -1,4 +1,4 @@
-"""The network that a PPO training leaves, its policy without exploration, value and optimiser; and back."""
+"""Conversion of a PPO policy to a deployable network, without exploration, value and optimiser; and back."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -19,7 +19,7 @@ from iowbc.recipe.teacher import Teacher
 def trained_network(
     policy: Mapping[str, NDArray[Any]], settings: Teacher, mirrors: Mirrors
 ) -> tuple[Network, dict[str, Any]]:
-    """The policy's mean action with its normalisation inside, and the arguments that rebuild the network.
+    """Network of the policy's mean action, including normalisation, and the arguments that rebuild it.
 
     policy: parameters and buffers of an `ActorCritic`; mirrors: of a row (s_t, s_priv) and of an action.
     """
@@ -54,9 +54,9 @@ def trained_network(
 
 
 def take_over(policy: ActorCritic, network: Network) -> None:
-    """Inverse of `trained_network` for what acts: mean action and standard deviation; the value stays as it is.
+    """Load a trained network's mean action and standard deviation into a PPO policy; its value network is unchanged.
 
-    Raises RuntimeError where the policy's networks are other ones.
+    Raises RuntimeError if the networks have different architectures.
     """
     learnt = network.state_dict() if isinstance(network, StudentNetwork) else network.body.state_dict()
     actor = policy.actor.network if isinstance(policy.actor, HistoryActor) else policy.actor

@@ -1,1 +1,1 @@
-"""Rollouts made where the environments are: policies in NumPy, what drives with them, what is recorded."""
+"""Rollouts in the environments' processes: policies in NumPy, rollout policies and recorded trajectories."""

@@ -1,7 +1,7 @@
-"""Blocks of environments for which a policy is computed together, the same blocks however many workers there are.
+"""Blocks of environments that share one policy evaluation, independent of the number of workers.
 
-A product of matrices rounds its sums in an order that follows from the shapes. Blocks begin at fixed environments and
-workers hold whole blocks, so that what is computed for an environment does not depend on who computes it.
+The rounding of a matrix product depends on its shape. Blocks start at fixed environments and workers hold whole blocks,
+so that the result for an environment does not depend on the worker.
 """
 
 from collections.abc import Callable
@@ -12,19 +12,19 @@ import numpy as np
 from iowbc.arrays import Array
 
 LARGEST = 4
-"""Environments in a block: with four rows the products of a policy take no longer than with all at once (0.35 ms for 48
-rows of [512, 256, 128]; with eight 0.5 ms), and few leave no worker with much more than its share."""
+"""Most environments in a block. Blocks of four take no longer than all rows at once (0.35 ms for 48 rows of
+[512, 256, 128]; 0.5 ms with blocks of eight), and small blocks balance the load of the workers."""
 FEWEST = 8
-"""Blocks that there are at least, as far as environments go: with few environments they are smaller."""
+"""Fewest blocks: with few environments, blocks are smaller, down to one environment."""
 
 
 def block_size(environments: int) -> int:
-    """Environments in each block but the last one, which may be smaller."""
+    """Environments per block; the last block may be smaller."""
     return max(1, min(LARGEST, environments // FEWEST))
 
 
 def shares_in_blocks(environments: int, parts: int) -> list[tuple[int, int]]:
-    """First and last environment (excluded) of nearly equal groups of whole blocks, as many as there are blocks for."""
+    """First and last environment (excluded) of nearly equal groups of whole blocks; at most `parts` groups."""
     size = block_size(environments)
     blocks = -(-environments // size)
     parts = min(parts, blocks)
@@ -33,8 +33,8 @@ def shares_in_blocks(environments: int, parts: int) -> list[tuple[int, int]]:
 
 
 def in_blocks(function: Callable[[Array], Array], size: int, x: Array) -> Array:
-    """A function of stacked blocks, (blocks, size, ...) to (blocks, size, k), for rows (n, ...), of which the first
-    begins a block: (n, k)."""
+    """Apply a function of stacked blocks, (blocks, size, ...) to (blocks, size, k), to rows (n, ...); returns (n, k).
+    The first row starts a block."""
     whole = len(x) // size * size
     parts = [x[:whole].reshape(-1, size, *x.shape[1:])] if whole else []
     if whole < len(x):

@@ -1,4 +1,4 @@
-"""Policies in NumPy: mean actions of stacks of rows, as fast as torch's, without its memory in every worker."""
+"""Policies in NumPy: mean actions of stacked rows, as fast as torch, without its memory use in every worker."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ def elu(x: Array) -> Array:
 
 
 ACTIVATIONS: Mapping[str, Activation] = {"elu": elu, "relu": lambda x: np.maximum(x, 0.0), "tanh": np.tanh}
-"""By their name in a recipe."""
+"""Activations by their name in a recipe."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Linear:
 
 @dataclass(frozen=True)
 class Layers:
-    """Linear layers with an activation between them; a network that commutes with a mirror is one with tied weights."""
+    """Linear layers with an activation between them. A mirror-symmetric network is one with tied weights."""
 
     layers: tuple[Linear, ...]
     activation: str
@@ -67,14 +67,14 @@ class Normal:
 
 @dataclass(frozen=True)
 class HistoryEncoder:
-    """A history, (..., n, K, S) normalised, oldest first, to a latent, (..., n, latent): each observation is projected
-    by the same layer, and all projections by another."""
+    """Normalised history, (..., n, K, S), oldest first, to latent, (..., n, latent): one layer shared by all
+    observations, then one layer on all their features."""
 
     frame: Linear
     whole: Linear
     activation: str
     mirror: tuple[Indices, Array] | None = None
-    """Permutation and sign by which an observation is mirrored, where the latent is of the history and its image."""
+    """Permutation and sign that mirror an observation, if the latent encodes the history and its mirror image."""
 
     def __call__(self, history: Array) -> Array:
         if self.mirror is None:
@@ -91,7 +91,7 @@ class HistoryEncoder:
 
 @dataclass(frozen=True)
 class RowPolicy:
-    """Of the newest row, (..., n, S + P) to (..., n, A)."""
+    """Policy of the newest row: (..., n, S + P) to (..., n, A)."""
 
     normal: Normal
     body: Layers
@@ -102,12 +102,12 @@ class RowPolicy:
 
 @dataclass(frozen=True)
 class HistoryPolicy:
-    """Of the history H_t, (..., n, K, S), oldest first, to (..., n, A): a student."""
+    """Policy of the history H_t, such as a student: (..., n, K, S), oldest first, to (..., n, A)."""
 
     normal: Normal
     encoder: HistoryEncoder
     estimate: Linear | None
-    """Reads s_priv from the latent, where the body is to see that."""
+    """Layer that estimates s_priv from the latent, if the body receives s_priv."""
     body: Layers
 
     def __call__(self, history: Array) -> Array:

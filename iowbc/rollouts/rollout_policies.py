@@ -1,4 +1,4 @@
-"""Policies that make rollouts, with noise or teachers beside them. They are sent to where the environments are."""
+"""Rollout policies, with exploration noise or teachers. They are sent to the environments' processes."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -13,18 +13,18 @@ from iowbc.rollouts.history import History
 from iowbc.rollouts.policies import HistoryPolicy, RowPolicy
 
 Decision = tuple[Array, Mapping[str, Array]]
-"""The action, (n, A), and what is recorded beside it, (n, ...) by name."""
+"""The action, (n, A), and further records by name, (n, ...)."""
 
 
 class RolloutPolicy(Protocol):
-    """Drives n environments through one rollout."""
+    """Policy that acts in n environments during one rollout."""
 
     @property
     def starts(self) -> Mask:
         """Environments whose episode begins with the first row, (n,)."""
 
     def part(self, first: int, last: int) -> "RolloutPolicy":
-        """Of the environments from `first` to `last`, the latter excluded; `first` begins a block."""
+        """The policy for environments `first` to `last`, the latter excluded; `first` starts a block."""
 
     def act(self, step: int, rows: Array, starts: Mask) -> Decision:
         """The decision for rows (n, S); `starts`: environments whose episode begins with them, (n,)."""
@@ -32,19 +32,19 @@ class RolloutPolicy(Protocol):
 
 @dataclass(frozen=True)
 class Past:
-    """The observations before a rollout."""
+    """Observations before a rollout."""
 
     frames: Array
-    """(n, K, S), oldest first; of these all but the first are looked at."""
+    """(n, K, S), oldest first; the oldest is not used."""
     starts: Mask
-    """Environments to which they do not matter, for an episode begins, (n,)."""
+    """Environments in which an episode begins, so that `frames` are ignored, (n,)."""
 
     def of(self, first: int, last: int) -> "Past":
-        """Of some environments."""
+        """The part of environments `first` to `last`, the latter excluded."""
         return Past(self.frames[first:last], self.starts[first:last])
 
     def history(self) -> History:
-        """A history that continues them."""
+        """A history that starts with `frames`."""
         history = History(*self.frames.shape)
         history.frames[:] = self.frames
         return history
@@ -52,7 +52,7 @@ class Past:
 
 @dataclass(frozen=True)
 class ExploringPolicy:
-    """A policy with exploration noise. With a past it sees the history of the first part of the rows."""
+    """Policy with exploration noise. With `past`, its input is the history of s_t, the first part of a row."""
 
     policy: RowPolicy | HistoryPolicy
     noise: Array
@@ -85,7 +85,7 @@ class ExploringPolicy:
 
 @dataclass(frozen=True)
 class DaggerPolicy:
-    """A student, and teachers that say what they would have done and drive some of the environments."""
+    """A student, and teachers that label every step with their own action and act in some of the environments."""
 
     student: HistoryPolicy
     teachers: tuple[RowPolicy, ...]
@@ -94,11 +94,11 @@ class DaggerPolicy:
     privileged: slice
     """Place of s_priv in a row."""
     masked: Indices
-    """Places in a row of what is masked for the teachers, which see its mean there."""
+    """Indices in a row that are masked for the teachers, which receive the mean there."""
     teacher_of: Indices
-    """Place of each environment's teacher among them, (n,)."""
+    """Index of each environment's teacher, (n,)."""
     taught: Mask
-    """Environments that their teacher drives, (n,)."""
+    """Environments in which the teacher acts, (n,)."""
     block: int
     """Size of the blocks of environments, see `iowbc.rollouts.blocks`."""
     past: Past
@@ -118,7 +118,7 @@ class DaggerPolicy:
         return self.past.history()
 
     def act(self, step: int, rows: Array, starts: Mask) -> Decision:
-        """See `RolloutPolicy`. Recorded are `own`, the student's action, and `answer`, the teacher's, (n, A)."""
+        """See `RolloutPolicy`. Records `own`, the student's action, and `answer`, the teacher's, (n, A) each."""
         del step
         answer = self._answer(0, rows)
         for place in range(1, len(self.teachers)):
@@ -129,7 +129,7 @@ class DaggerPolicy:
         return np.where(self.taught[:, None], answer, own), {"own": own, "answer": answer}
 
     def _answer(self, place: int, rows: Array) -> Array:
-        """Actions of one teacher in every environment, whole blocks at a time, (n, A)."""
+        """Actions of one teacher in every environment, (n, A), computed in blocks."""
         teacher, seen = self.teachers[place], rows.copy()
         seen[:, self.masked] = teacher.normal.mean[self.masked]
         seen = np.concatenate([seen[:, self.observation], seen[:, self.privileged]], axis=1)

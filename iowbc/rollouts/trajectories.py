@@ -1,4 +1,4 @@
-"""Many steps of many environments: what a rollout records, and how it is made."""
+"""Rollouts of many environments and the trajectories that they record."""
 
 import time
 from collections.abc import Mapping, Sequence
@@ -12,7 +12,7 @@ from iowbc.rollouts.rollout_policies import RolloutPolicy
 
 
 class Stepped(Protocol):
-    """n environments that read actions from their buffers and leave there what comes of them."""
+    """n environments that read actions from their buffers and write the results there."""
 
     @property
     def buffers(self) -> Any:
@@ -20,7 +20,7 @@ class Stepped(Protocol):
         (n,); where an episode ended, `observation` is of the next one."""
 
     def step(self) -> None:
-        """One control step of every environment; those that end begin anew."""
+        """One control step of every environment; environments whose episode ends are reset."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Trajectories:
     """T steps of n environments."""
 
     observation: Array
-    """Rows before each step and behind the last one, (T + 1, n, S)."""
+    """Rows before each step and after the last one, (T + 1, n, S)."""
     action: Array
     """(T, n, A)."""
     reward: Array
@@ -36,17 +36,17 @@ class Trajectories:
     ended: Mask
     """True where an episode ended with the step, (T, n)."""
     cut: Array
-    """Step and environment of each episode that its time limit ended, (k, 2), in order."""
+    """Step and environment of each episode truncated by its time limit, (k, 2), in order."""
     cut_observation: Array
     """The last row of those episodes, (k, S)."""
     records: Mapping[str, Array]
     """Further records of the policy, (T, n, ...) by name."""
     acting: float
-    """Time that the policy took of it [s], the mean over those who worked side by side."""
+    """Time spent in the policy [s], mean over parallel workers."""
 
 
 def roll(environments: Stepped, rollout_policy: RolloutPolicy, steps: int) -> Trajectories:
-    """Makes a rollout of some steps. Raises ValueError where an action is not finite."""
+    """Make a rollout of `steps` steps. Raises ValueError if an action is not finite."""
     buffers, acting = environments.buffers, 0.0
     observations, actions, rewards, ends = [], [], [], []
     records: list[Mapping[str, Array]] = []
@@ -89,7 +89,7 @@ def _check_finite(action: Array) -> None:
 
 
 def side_by_side(parts: Sequence[Trajectories]) -> Trajectories:
-    """Trajectories of consecutive groups of environments as those of all."""
+    """Join the trajectories of consecutive groups of environments."""
     if len(parts) == 1:
         return parts[0]
     offsets = np.cumsum([0, *(part.reward.shape[1] for part in parts[:-1])])

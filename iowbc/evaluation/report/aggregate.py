@@ -1,4 +1,4 @@
-"""From the long table of trials to one row for each variant, suite, case and mass."""
+"""Summary of the long table of trials: one row per variant, suite, case, mass and impulse."""
 
 from typing import Any
 
@@ -10,7 +10,7 @@ from iowbc.evaluation.report.statistics import design_effect, mean_half_width, w
 from iowbc.evaluation.trials.errors import ERRORS, error_norm
 
 PARTS = ("", "_moving", "_clamped")
-"""Suffixes of the errors: over the whole trial, where steps are asked for, against clamped commands."""
+"""Suffixes of the errors: over the whole trial, while stepping is commanded, against clamped commands."""
 ALL_ERRORS = tuple(f"{name}{part}" for part in PARTS for name in ERRORS)
 STILL = tuple(f"still_{name}{part}" for part in ("", "_moving") for name in ERRORS)
 """The errors of a robot that stands still, from the script alone."""
@@ -18,35 +18,36 @@ OVER_ALL_TRIALS = (
     *("transport_robot", "transport_object", "hand_force_mean", "hand_force_p95", "hand_force_peak"),
     *("handle_force_mean", "handle_force_p95", "handle_force_peak", "partner_work"),
 )
-"""Metrics averaged over all trials, up to their end, since a robot pulls before it falls; the others over the
+"""Metrics averaged over all trials, up to their end, since a robot pulls before it falls. All others are averaged over
 surviving trials."""
 RAW = ("E_v_raw", "E_v_raw_moving")
-"""E_v without the mean over a gait period; trials of an early version lack it."""
+"""E_v without averaging over a gait period; missing in trials of an early version."""
 SETTINGS = (
     *("commanded_distance", "partner_share", "rolling_resistance", "pull_frequency", "pull_direction"),
     *("height", "gait_period"),
 )
-"""Columns that are the same for all trials of a row."""
+"""Columns with the same value in all trials of a row."""
 TORQUE = "torque_rms"
-"""Root mean square of a joint's torque as a part of its limit: the worst joint's, and of each after a slash."""
+"""RMS torque as a fraction of the limit: of the worst joint and, with a slash and its name appended, of each joint."""
 TRAINING = "training_seed"
-"""Column that tells the trainings of one variant apart; where it is absent, there is one."""
+"""Column that identifies the training of a variant; if absent, there is only one."""
 WORLD = "trial"
-"""Column that tells worlds apart: trials of one number have the same draws and commands at every mass, in every suite
-and with every training, and count as one where intervals are concerned."""
+"""Column that identifies the world. Trials of one number have the same random draws and commands at every mass, in
+every suite and with every training; intervals treat them as one cluster."""
 GROUP = ["variant", "kind", "suite", "case", "mass", "impulse"]
 
 
 def aggregate(trials: pd.DataFrame) -> pd.DataFrame:
-    """One row for each of `GROUP`, by suite and case in order of appearance, mass, and the paper's order of variants.
+    """One row per combination of `GROUP`, by suite and case in order of appearance, mass, impulse, and the paper's
+    order of variants.
 
-    Columns: `trainings`, whose trials count alike; `trials`, `survived`, `succeeded`, `carried` (trials with an object
-    in the hands whose weight they carried) of `held`, `kept` (trials that did not lose what they push) of `pushed`;
-    `rate` of success with its Wilson interval `rate_low`, `rate_high`; every metric's mean over the surviving trials,
-    or, see `OVER_ALL_TRIALS`, all; of an error `<error>_half`, half its 95 % interval; `norm`, the norm of the four
-    errors; `torque_rms` of the worst joint by the means of all, and its name `torque_rms_joint`. Intervals take `WORLD`
-    as clusters. NaN where no trial survived (or one alone, for the half widths): "Fails" in the tables. Metrics that
-    trials of an earlier version lack are missing here, too.
+    Columns: number of `trainings`, pooled; `trials`, `survived`, `succeeded`; `held` (trials with an object in the
+    hands) and `carried` (those that carried its weight); `pushed` and `kept` (those that did not lose the object);
+    success `rate` with its Wilson interval `rate_low`, `rate_high`; means of all metrics over surviving trials, or over
+    all trials for `OVER_ALL_TRIALS`; `<error>_half`, half the 95 % interval of an error; `norm` of the four errors;
+    `torque_rms` of the joint with the largest mean, and its name `torque_rms_joint`. Intervals use `WORLD` as clusters.
+    NaN if no trial survived ("Fails" in the tables), for half widths also if only one did. Metrics that trials of an
+    earlier version lack are missing here, too.
     """
     missing = [name for name in (*RAW, *OVER_ALL_TRIALS, *SETTINGS) if name not in trials]
     trials = with_trainings(trials).assign(**dict.fromkeys(missing, np.nan))
@@ -99,7 +100,7 @@ def _row(key: dict[str, object], group: pd.DataFrame, metrics: list[str]) -> dic
 
 
 def with_trainings(trials: pd.DataFrame) -> pd.DataFrame:
-    """Trials that say of which training they are; those that do not are of one."""
+    """Trials with the column `TRAINING`; if it is missing, all belong to one training."""
     return trials if TRAINING in trials else trials.assign(**{TRAINING: "0"})
 
 
@@ -111,11 +112,11 @@ def variants_of(trials: pd.DataFrame) -> list[str]:
 
 
 def asks_for_steps(rows: pd.DataFrame) -> bool:
-    """Steps are commanded in any of these trials, as in the paper's: errors of standing are not to be held against its
-    errors of walking."""
+    """True if stepping is commanded in any of these trials, as in the paper's. Errors of standing are not comparable
+    to the paper's errors of walking."""
     return bool(rows["still_E_v_moving"].notna().any())
 
 
 def suites_of(summary: pd.DataFrame, *kinds: str) -> list[str]:
-    """The suites of some kinds, in order of appearance."""
+    """Suites of the given kinds, in order of appearance."""
     return [str(suite) for suite in dict.fromkeys(summary.loc[summary["kind"].isin(kinds), "suite"])]

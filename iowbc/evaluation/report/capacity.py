@@ -1,4 +1,4 @@
-"""The largest load, or push, up to which a variant succeeds: figures and tables."""
+"""Capacity: the largest load or push up to which a variant succeeds."""
 
 from dataclasses import dataclass
 
@@ -12,35 +12,34 @@ from iowbc.results.table import ABSENT, Table, heads
 
 @dataclass(frozen=True)
 class Capacity:
-    """The largest value up to which every value tried reached the success rate."""
+    """The largest value up to which all tested values reached the success rate."""
 
     value: float | None
-    """None where the smallest one failed."""
+    """None if the smallest tested value failed."""
     smallest: float
-    """That was tried."""
+    """Smallest tested value."""
     open_ended: bool
-    """True where it is also the largest that was tried, so that the true one may be larger."""
+    """True if `value` is the largest tested value, so that the capacity may be larger."""
 
     def text(self, unit: str) -> str:
-        """As it stands in a table."""
+        """Table cell."""
         if self.value is None:
             return f"< {self.smallest:g} {unit}" if self.smallest > 0 else "Fails"
         return f"{'≥ ' if self.open_ended else ''}{self.value:g} {unit}"
 
 
 Capacities = dict[str, dict[str, Capacity]]
-"""By variant, then by suite or direction; only those that were played."""
+"""Capacities by variant, then by suite or direction, of those that were tested."""
 
 
 def load_capacities(summary: pd.DataFrame, rate: float) -> Capacities:
-    """The largest mass of each sweep [kg] up to which every mass of an object reached the success rate, of all
-    variants."""
+    """Load capacity [kg] of each variant in each mass sweep at a success rate."""
     swept = summary[summary["kind"].isin(SWEPT) & (summary["case"] == summary["suite"])]
     return {variant: {} for variant in variants_of(summary)} | _capacities(swept, "mass", rate)
 
 
 def push_capacities(summary: pd.DataFrame, rate: float) -> Capacities:
-    """The largest impulse on the base in each direction [N·s] up to which every one was survived at the rate."""
+    """Largest impulse on the base [N·s] in each direction up to which all reached the success rate."""
     return _capacities(summary[summary["kind"] == "pushes"], "impulse", rate)
 
 
@@ -56,7 +55,7 @@ def _capacities(rows: pd.DataFrame, by: str, rate: float) -> Capacities:
 
 
 def capacity_table(summary: pd.DataFrame, rate: float) -> Table:
-    """The largest mass that each variant carries and pushes with the success rate asked for."""
+    """Load capacity of each variant by suite at a success rate."""
     suites = suites_of(summary, *SWEPT)
     asked = [(summary.loc[summary["suite"] == suite, "commanded_distance"] > 0).any() for suite in suites]
     caption = (
@@ -83,7 +82,7 @@ def push_table(summary: pd.DataFrame, rate: float) -> Table:
 def _table(
     name: str, caption: str, found: Capacities, columns: dict[str, str], unit: str, last: list[tuple[str, ...]]
 ) -> Table:
-    """A row for each variant; `columns`: heads by suite or direction."""
+    """Table with a row per variant; `columns`: heads by suite or direction."""
     rows = [
         (variant, *(own[case].text(unit) if case in own else ABSENT for case in columns))
         for variant, own in found.items()

@@ -56,8 +56,8 @@ def rolling_resistance(rows: pd.DataFrame) -> str:
 
 
 def regime(summary: pd.DataFrame, row: pd.Series, error: str) -> list[str]:
-    """Words beside the paper's `error` at the mass of a row of a summary: that its μ is unknown, and our E_v at the
-    same mass where our crates resist so much that they stagnate, as its did. None for other errors, and without load.
+    """Notes beside the paper's E_v at the mass of a row of a summary: that its μ is unknown, and our E_v at the same
+    mass and at μ from `STAGNATING`, where our crates stagnate like the paper's. Empty for other errors or without load.
     """
     if error != "E_v" or row["kind"] != "pushing" or not row["mass"] > 0:
         return []

@@ -1,4 +1,4 @@
-"""Columns of result tables, one entry each: head, cell of a row of the summary, score of a robot that stands still."""
+"""Columns of result tables: head, cell for a row of the summary, score of a robot that stands still."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from iowbc.evaluation.trials.transport import SHORTEST_WAY
 from iowbc.results.table import ABSENT, FAILS, Cell, Column, Table, heads, measured
 
 STANDS_STILL = "stands still"
-"""The row of a robot that does nothing, computed from the script: who scores no better has done nothing."""
+"""Baseline row: scores of a robot that does not move, computed from the script."""
 RAW = "E_v_raw"
 """E_v without the mean over a gait period."""
 ERROR_HEADS = {
@@ -27,7 +27,7 @@ HEADS = {name: ERROR_HEADS[name] for name in ERRORS}
 
 @dataclass(frozen=True)
 class Entry:
-    """One column of a table that has a row for each variant."""
+    """One column of a table with a row per variant."""
 
     column: Column
     cell: Callable[[pd.Series], Cell]
@@ -39,7 +39,7 @@ class Entry:
 def variant_rows(
     entries: Sequence[Entry], groups: Iterable[tuple[str, pd.DataFrame]], still: bool = False
 ) -> list[tuple[Cell, ...]]:
-    """Rows of a table: what a group is called, variant, entries; with `still` a last row of each group."""
+    """Rows of a table: name of the group, variant, entries; `still` adds a row of standing still to each group."""
     found: list[tuple[Cell, ...]] = []
     for name, group in groups:
         found += [(name, str(row["variant"]), *(one.cell(row) for one in entries)) for _, row in group.iterrows()]
@@ -55,7 +55,7 @@ def variant_table(
     rows: Sequence[tuple[Cell, ...]],
     numbers: pd.DataFrame,
 ) -> Table:
-    """The table of such rows; `first`: head of what a group is called."""
+    """Table of the rows of `variant_rows`; `first`: head of the column of group names."""
     return Table(name, caption, heads(first, "Algorithm", *(one.column for one in entries)), rows, numbers)
 
 
@@ -65,13 +65,13 @@ def still_row(entries: Sequence[Entry], rows: pd.DataFrame, name: str = "any") -
 
 
 def by_case(rows: pd.DataFrame) -> list[tuple[str, pd.DataFrame]]:
-    """The rows of each case and mass, and what they are called."""
+    """Rows grouped by case and mass, with the name of each group."""
     groups = rows.groupby(["suite", "case", "mass"], sort=False)
     return [(f"{case} ({mass:g} kg)", group) for (_, case, mass), group in groups]
 
 
 def still_error(rows: pd.DataFrame, name: str, part: str = "") -> Cell:
-    """Mean error of a robot that stands still; its velocity needs no averaging."""
+    """Mean error of a robot that stands still; E_v raw equals E_v, since its velocity needs no averaging."""
     return measured(float(rows[f"still_{'E_v' if name == RAW else name}{part}"].mean()))
 
 
@@ -91,7 +91,7 @@ def mean_entry(head: str, name: str, form: str, scale: float = 1.0) -> Entry:
 
 
 def asks_for_transport(rows: pd.DataFrame) -> bool:
-    """True where any of these trials commands a way that has to be covered."""
+    """True if any of these trials commands a distance that must be covered."""
     return bool((rows["commanded_distance"] >= SHORTEST_WAY).any()) and not (rows["kind"] == "stagnation").all()
 
 

@@ -1,4 +1,4 @@
-"""Tables and figure of the interaction with a partner: forces, work, whose motion is followed, mechanical impedance."""
+"""Tables and figure of the interaction with a partner: forces, work, velocity errors, mechanical impedance."""
 
 import numpy as np
 import pandas as pd
@@ -22,8 +22,8 @@ from iowbc.evaluation.trials.impedance import apparent
 from iowbc.results.table import ABSENT, FAILS, Cell, Column, Table, measured
 
 BLOCKED_BEFORE = {"IO-WBC": (113, 231), "w/o Distill.": (73, 109)}
-"""Peak forces of a hand on a blocked crate [N] over the trials of the first published controllers, which were trained
-without a bound on them."""
+"""Range of peak hand forces on a blocked crate [N] over trials of the first published controllers, which were trained
+without a bound on hand forces."""
 
 
 def _force(head: str, name: str) -> Entry:
@@ -58,7 +58,7 @@ FITTED = (Column("Stiffness [N/m]"), Column("Damping [N·s/m]"), Column("Mass [k
 
 
 def compliance_table(summary: pd.DataFrame) -> Table:
-    """Forces, work and errors of each variant with each behaviour of the partner, and before a blocked crate."""
+    """Forces, work and errors of each variant for each partner behaviour and for a blocked crate."""
     chosen = summary[summary["kind"] == "compliance"]
     before = ", ".join(f"{variant} {low} to {high} N" for variant, (low, high) in BLOCKED_BEFORE.items())
     caption = (
@@ -75,7 +75,7 @@ def compliance_table(summary: pd.DataFrame) -> Table:
 
 
 def impedance_table(summary: pd.DataFrame) -> Table:
-    """The mechanical impedance to pulls of each direction and frequency, and mass, spring and damper that have it."""
+    """Mechanical impedance by direction and frequency of the pull, and the fitted mass, spring and damper."""
     chosen = summary[summary["kind"] == "impedance"]
     entries = (*IMPEDANCE, *(Entry(column, lambda row: ABSENT) for column in FITTED))
     rows: list[tuple[Cell, ...]] = []
@@ -106,7 +106,7 @@ def impedance_table(summary: pd.DataFrame) -> Table:
 
 
 def compliance_figure(summary: pd.DataFrame) -> Figure:
-    """Forces at handle and hands and the deviation from command and partner by behaviour, and the impedance."""
+    """Forces at handle and hands and velocity error to the partner by partner behaviour, and the impedance."""
     behaviours = summary[summary["kind"] == "compliance"]
     figure = Figure(figsize=(11.0, 7.0), layout="constrained")
     panels = list(figure.subplots(2, 2).flat)
@@ -119,7 +119,7 @@ def compliance_figure(summary: pd.DataFrame) -> Figure:
 
 
 def _behaviour_bars(axes: Axes, chosen: pd.DataFrame, column: str, title: str) -> None:
-    """A bar for each case with such a figure, or a cross where nobody survived; whiskers up to the peak of a force."""
+    """Bars of a column by case, or a cross if no trial survived; whiskers up to the peak of a force."""
     axes.set_title(title)
     keys = ["suite", "case", "mass"]
     force = column.endswith("_p95")
@@ -139,7 +139,7 @@ def _behaviour_bars(axes: Axes, chosen: pd.DataFrame, column: str, title: str) -
 
 
 def _impedance_curves(axes: Axes, pulls: pd.DataFrame, variants: list[str]) -> None:
-    """Magnitude over frequency, a curve for each variant and direction."""
+    """Magnitude over frequency, one curve per variant and direction."""
     axes.set_title("mechanical impedance [N·s/m]")
     for (variant, direction), rows in pulls.groupby(["variant", "pull_direction"], sort=False):
         ordered = rows.sort_values("pull_frequency")

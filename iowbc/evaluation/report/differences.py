@@ -1,4 +1,4 @@
-"""Differences of variants in pairs of trials of one seed."""
+"""Paired differences between variants, in trials of the same seed."""
 
 import numpy as np
 import pandas as pd
@@ -11,12 +11,12 @@ from iowbc.evaluation.trials.errors import ERRORS
 from iowbc.results.table import ABSENT, Column, Table, heads, measured
 
 PAIR = ["suite", "case", "mass", "impulse", "trial", "training"]
-"""Columns that two trials share that meet the same world and commands; the first training of a variant is compared
-with the first of the other, and so on."""
+"""Columns that identify a pair: trials in the same world with the same commands. Trainings are paired in order, the
+first of a variant with the first of the other."""
 
 
 def paired(trials: pd.DataFrame, variant: str, reference: str) -> pd.DataFrame:
-    """The trials of two variants side by side, with the suffixes `_variant` and `_reference`."""
+    """Paired trials of two variants, with column suffixes `_variant` and `_reference`."""
     trials = with_trainings(trials)
     places = trials.groupby("variant")[TRAINING].transform(lambda seeds: pd.factorize(seeds)[0])
     trials = trials.assign(training=places)[["variant", *PAIR, "survived", "succeeded", *ERRORS]]
@@ -25,8 +25,8 @@ def paired(trials: pd.DataFrame, variant: str, reference: str) -> pd.DataFrame:
 
 
 def mean_difference(values: pd.Series, worlds: pd.Series) -> tuple[float, float, float]:
-    """Mean of paired differences, half its 95 % interval, Student's p of no difference, with the worlds (n,) that they
-    were met in as clusters; NaN of too few or equal."""
+    """Mean of paired differences, half its 95 % interval and p-value of Student's t-test, with the worlds, (n,), as
+    clusters. Interval and p are NaN for fewer than two or equal values, the mean for none."""
     differences, clusters = values.to_numpy(np.float64), worlds.to_numpy()
     if len(differences) < 2 or np.allclose(differences, differences[0]):
         return float(np.mean(differences)) if len(differences) else np.nan, np.nan, np.nan
@@ -34,19 +34,19 @@ def mean_difference(values: pd.Series, worlds: pd.Series) -> tuple[float, float,
 
 
 def success_p(pairs: pd.DataFrame) -> float:
-    """Exact p of equal success if the variants' names might be exchanged in each world; 1 where no pair differs.
-    McNemar's where no two pairs share a world."""
+    """Exact p-value of equal success, by permutation of the variants within each world; 1 if no pair differs. Equals
+    McNemar's test if no two pairs share a world."""
     better = pairs["succeeded_variant"].astype(int) - pairs["succeeded_reference"].astype(int)
     return sign_flip_p(better.groupby(pairs[WORLD]).sum().to_numpy(np.int64))
 
 
 def difference_table(trials: pd.DataFrame) -> Table | None:
-    """Differences of each variant to the first, over all masses of each suite; None for a single variant."""
+    """Differences of each variant to the first, over all masses of each suite; None if there are no pairs."""
     reference, *others = variants_of(trials)
     rows, numbers = [], []
 
     def add(suite: str, variant: str, errors: pd.DataFrame, last: str, **figures: object) -> None:
-        """A row of differences of the errors, each beside its world."""
+        """Add a row of error differences; `errors` also holds the world of each."""
         found = {name: mean_difference(errors[name], errors[WORLD]) for name in ERRORS}
         cells = [measured(mean, half, "+.3f", note=f" (p {p:.2g})") for mean, half, p in found.values()]
         rows.append((suite, variant, str(len(errors)), *cells, last))

@@ -1,4 +1,4 @@
-"""Tables of tracking errors in the paper's own form (II and III), beside its numbers and a robot that stands still."""
+"""Tracking error tables in the form of the paper's II and III, with its numbers and a robot that stands still."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -28,19 +28,19 @@ from iowbc.evaluation.trials.errors import ERRORS
 from iowbc.results.table import ABSENT, FAILS, Cell, Column, Table, measured
 
 NUMBERS = {"lifting": "II", "pushing": "III"}
-"""The paper's table of a kind."""
+"""The paper's table number of each kind."""
 SWEPT = (*NUMBERS, "squeezing")
-"""Kinds of suites that go over masses; the paper has no table of the last."""
+"""Kinds of mass sweeps; the paper has no table of the last."""
 NO_LABELS: Mapping[str, str] = MappingProxyType({})
 
 
 def error_table(
     summary: pd.DataFrame, suite: str, labels: Mapping[str, str] = NO_LABELS, name: str | None = None
 ) -> Table:
-    """Errors over the whole trial by mass or case and variant, with survival, success, transport, what is kept.
+    """Errors over the whole trial by mass or case and variant, with survival, success, transport and kept objects.
 
-    labels: the paper's name of variants that go by another one here; where it knows none, its columns are left out.
-    name: of the table; that of the suite by default.
+    labels: the paper's names of variants with another name here; without any variant of the paper, its columns are
+    omitted. name: of the table, default that of the suite.
     """
     chosen = summary[summary["suite"] == suite]
     kind = str(chosen["kind"].iloc[0])
@@ -53,7 +53,7 @@ def error_table(
 
 
 def moving_table(summary: pd.DataFrame, suite: str) -> Table:
-    """The errors over the part of the trials in which steps are asked for."""
+    """Errors over the parts of the trials in which stepping is commanded."""
     chosen = summary[summary["suite"] == suite]
     caption = (
         f"Command tracking errors in {suite} while steps are asked for: means over surviving trials with their "
@@ -64,9 +64,9 @@ def moving_table(summary: pd.DataFrame, suite: str) -> Table:
 
 
 def paper_table(summary: pd.DataFrame, labels: Mapping[str, str] = NO_LABELS) -> Table | None:
-    """Every cell of the paper's tables that was played walking: ours, the paper's, and the ratio; None without any.
+    """All cells of the paper's tables that were evaluated with walking: ours, the paper's and the ratio; None without.
 
-    labels: the paper's name of variants that go by another one here.
+    labels: the paper's names of variants with another name here.
     """
     entries = (
         Entry(Column("Mass"), lambda row: f"{row['mass']:g} kg", lambda rows: "any"),
@@ -108,12 +108,12 @@ def paper_table(summary: pd.DataFrame, labels: Mapping[str, str] = NO_LABELS) ->
 
 
 def slug(suite: str) -> str:
-    """A suite's name as that of a file."""
+    """File name of a suite."""
     return suite.replace(" ", "_")
 
 
 def with_paper(rows: pd.DataFrame, labels: Mapping[str, str]) -> pd.DataFrame:
-    """The numbers with the paper's, `paper_<error>`, and ours in parts of them, `ratio_<error>`; NaN without any."""
+    """Rows with the paper's errors, `paper_<error>`, and the ratio of ours to them, `ratio_<error>`; NaN if missing."""
     found = [
         reported(row["kind"], row["mass"], labels.get(row["variant"], row["variant"])) for _, row in rows.iterrows()
     ]
@@ -137,7 +137,7 @@ def _by_mass_or_case(name: str, caption: str, entries: list[Entry], chosen: pd.D
 
 
 def _paper_entry(summary: pd.DataFrame, error: str, labels: Mapping[str, str]) -> Entry:
-    """The paper's error, and in brackets ours in parts of it; of pushes with what it does not say."""
+    """The paper's error, in brackets the ratio of ours to it and the notes of `regime`."""
 
     def cell(row: pd.Series) -> str:
         value, ratio = row[f"paper_{error}"], row[f"ratio_{error}"]
@@ -152,7 +152,7 @@ def _paper_entry(summary: pd.DataFrame, error: str, labels: Mapping[str, str]) -
 
 
 def _ratio_entry(summary: pd.DataFrame, error: str) -> Entry:
-    """Ours, the paper's, and ours in parts of it; of an error that the paper does not have ours alone."""
+    """Our error, the paper's and the ratio; ours alone if the paper does not report the error."""
 
     def cell(row: pd.Series) -> Cell:
         if error == RAW:

@@ -34,19 +34,19 @@ MARKS = "means over the trials survived; at the upper edge: how many where not a
 STILL_NOTE = "grey: a robot that stands still"
 PAPER_NOTE = "hollow, dotted: the paper's numbers, for its own commands; the friction of its crates is unknown"
 PANEL_WIDTH, SMALLEST_WIDTH = 3.75, 7.5
-"""Width of a panel of the comparison, and of the whole figure with its legend [inch]."""
+"""Width of a panel of the comparison, and minimum width of the whole figure [inch]."""
 ROOMY = 4
-"""Variants whose bars and counts have room in a panel of that width; more make it wider."""
+"""Number of variants whose bars fit into a panel of `PANEL_WIDTH`; with more, it is wider."""
 LONGEST_TEXT = 5
-"""Characters above a bar that stand side by side where there are more variants."""
+"""With more than `ROOMY` variants, texts above bars with more characters than this are rotated."""
 LABEL_WIDTH = 11
 """Characters in a line under a bar."""
 SHIFT = 0.012
-"""Distance of the intervals of two variants at one mass, in parts of the range of masses."""
+"""Horizontal offset between the intervals of two variants, as a fraction of the range of masses."""
 HEADROOM = 0.15
-"""Room above the highest point, in parts of its height."""
+"""Space above the highest point, as a fraction of its height."""
 FAILURE_SPACING = 0.035
-"""Distance of two variants' crosses and counts of survivors, in heights of the panel."""
+"""Distance between the survivor marks of two variants, as a fraction of the panel height."""
 WHISKERS = {"ecolor": "black", "capsize": 3, "elinewidth": 1.0}
 """Style of intervals on bars."""
 
@@ -58,7 +58,7 @@ def style_of(variant: str, variants: Sequence[str]) -> dict[str, Any]:
 
 
 def errors_against_mass(summary: pd.DataFrame, suite: str) -> Figure:
-    """Four panels, one an error, over the mass of the object; 95 % intervals as bars; the paper's numbers hollow."""
+    """Four panels, one per error, over the object mass; 95 % intervals as bars, the paper's numbers hollow."""
     chosen = summary[summary["suite"] == suite]
     figure = Figure(figsize=(9.5, 6.6), layout="constrained")
     panels = list(figure.subplots(2, 2, sharex=True).flat)
@@ -72,7 +72,7 @@ def errors_against_mass(summary: pd.DataFrame, suite: str) -> Figure:
 def comparison(summary: pd.DataFrame, capacity_rate: float) -> Figure:
     """Error norm over lifting mass and over pushing mass, load capacity, success in the heavy tasks.
 
-    A panel for each that was evaluated.
+    One panel for each of these that was evaluated.
     """
     sweeps = [suites_of(summary, kind)[0] for kind in NUMBERS if suites_of(summary, kind)]
     bars = max(1.0, len(variants_of(summary)) / ROOMY)
@@ -94,7 +94,7 @@ def comparison(summary: pd.DataFrame, capacity_rate: float) -> Figure:
 
 
 def robustness(summary: pd.DataFrame, rate: float) -> Figure:
-    """Success under harder conditions and in stagnation, and the impulse on the base survived by direction."""
+    """Success in the robustness and stagnation suites, and the impulse on the base survived by direction."""
     suites = suites_of(summary, "robustness", "stagnation")
     pushes = summary[summary["kind"] == "pushes"]
     shown = [*suites, *suites_of(summary, "pushes")]
@@ -116,9 +116,9 @@ def draw_bars(
     labels: Sequence[str],
     intervals: Mapping[str, Array],
 ) -> None:
-    """Bars of each variant, side by side over each label, with texts above; NaN leaves a bar out.
+    """Grouped bars of all variants for each label, with texts above; no bar for NaN.
 
-    intervals: how far each reaches below and above its bar, (2, labels), of variants that have some.
+    intervals: extent below and above the top of each bar, (2, labels), for variants with intervals.
     """
     width = 0.8 / max(len(heights), 3)
     upright = len(heights) > ROOMY and max(len(text) for row in texts.values() for text in row) > LONGEST_TEXT
@@ -140,7 +140,7 @@ def line_labels(names: Sequence[tuple[str, float]]) -> list[str]:
 
 
 def finish(figure: Figure, lettered: Sequence[Axes], title: str, legend_of: Axes | None = None) -> Figure:
-    """Letters before the titles of panels, a title, and one legend below all with what a panel shows."""
+    """Add letters to panel titles, a figure title, and a common legend, of the panel `legend_of`, below."""
     for axes, letter in zip(lettered, ascii_lowercase, strict=False):
         axes.set_title(f"({letter}) {axes.get_title()}", fontsize=10)
     if title:
@@ -152,14 +152,14 @@ def finish(figure: Figure, lettered: Sequence[Axes], title: str, legend_of: Axes
 
 
 def tidy(axes: Axes) -> None:
-    """From zero, with a grid, without a frame."""
+    """Start the vertical axis at zero, add a grid, remove the frame."""
     _from_zero(axes)
     axes.grid(True, color="0.9")
     axes.spines[["top", "right"]].set_visible(False)
 
 
 def _row(panel: float, widths: Sequence[float], layout: Any) -> tuple[Figure, list[Axes]]:
-    """A figure of panels side by side, in widths of one panel [inch]."""
+    """Figure with panels side by side; `panel`: unit of `widths` [inch]."""
     figure = Figure(figsize=(max(panel * sum(widths), SMALLEST_WIDTH), 4.2), layout=layout)
     return figure, list(figure.subplots(1, len(widths), squeeze=False, width_ratios=widths).flat)
 
@@ -181,8 +181,8 @@ def _sweep_panel(
     still: float,
     of_paper: Callable[[tuple[float, ...]], float],
 ) -> None:
-    """A column over the mass of one suite, with intervals where it has some, for each variant; the score of a robot
-    that stands still, and the paper's numbers: `of_paper` of its four errors."""
+    """Plot a column over the mass in one suite for each variant, with intervals if available, the score of a robot that
+    stands still, and the paper's value, `of_paper` of its four errors."""
     for place, variant in enumerate(variants):
         rows = chosen[chosen["variant"] == variant].sort_values("mass")
         style = style_of(variant, variants)
@@ -203,7 +203,7 @@ def _sweep_panel(
 
 
 def _heaviest(summary: pd.DataFrame) -> pd.DataFrame:
-    """The heavy tasks, or without any the heaviest mass of each suite."""
+    """Rows of the heavy tasks or, if there are none, of the heaviest mass of each suite."""
     heavy = summary[summary["kind"] == "heavy"]
     if not heavy.empty:
         return heavy
@@ -233,7 +233,7 @@ def _capacity_bars(axes: Axes, found: Capacities, names: Sequence[str]) -> None:
 
 
 def _mark_survivors(axes: Axes, rows: pd.DataFrame, place: int, colour: str) -> None:
-    """At the panel's upper edge, one line a variant: how many survived a mass where not all did, a cross for none."""
+    """Mark masses that not all trials survived at the upper edge, one line per variant: survivors, or a cross."""
     transform, height = axes.get_xaxis_transform(), 0.98 - FAILURE_SPACING * place
     failed = rows[rows["survived"] == 0]["mass"]
     crosses = axes.plot(failed, [height] * len(failed), "x", color=colour, transform=transform, clip_on=False)
@@ -250,6 +250,6 @@ def _mark_survivors(axes: Axes, rows: pd.DataFrame, place: int, colour: str) -> 
 
 
 def _from_zero(axes: Axes) -> None:
-    """The vertical axis from 0 to above the highest point, so that its marker, bar label and interval are whole."""
+    """Set the vertical axis from 0 to above the highest point, with space for its marker, bar label and interval."""
     highest = axes.dataLim.ymax
     axes.set_ylim(0.0, (1.0 + HEADROOM) * highest if np.isfinite(highest) and highest > 0 else 1.0)

@@ -1,9 +1,9 @@
 """Interquartile means over all masses of a suite and all trainings of a variant, with bootstrap intervals.
 
 After R. Agarwal et al., "Deep Reinforcement Learning at the Edge of the Statistical Precipice" (2021): the mean of the
-middle half of all trials, an interval by resampling, and the probability that a variant improves on another. A trial
-that was not survived is worse than any that was, so that nobody gains by falling early. Resampling draws trainings and
-worlds: trial k is the same world at every mass, and a training the same policy.
+middle half of all trials, a bootstrap interval, and the probability that a variant improves on another. A trial that
+was not survived ranks below all others, so that falling early gives no advantage. The bootstrap resamples trainings and
+worlds, since trial k is the same world at every mass and a training the same policy.
 """
 
 from collections.abc import Mapping
@@ -21,18 +21,18 @@ from iowbc.evaluation.trials.errors import ERRORS, error_norm
 from iowbc.results.table import ABSENT, FAILS, Table, heads
 
 KINDS = (*SWEPT, "heavy", "robustness")
-"""Kinds of suites in which errors rank controllers."""
+"""Kinds of suites in which controllers are compared by errors."""
 FIGURES = ("success", *ERRORS, "norm")
-"""Figures of a trial."""
+"""Metrics of a trial."""
 
 Values = NDArray[np.float64]
 Block = Mapping[str, Values]
-"""Trials of a variant in one suite, by seed of the training: (masses or cases, trials, figures) by `FIGURES`; infinite
-errors where a trial was not survived."""
+"""Trials of a variant in one suite, by training seed: (masses or cases, trials, metrics in order of `FIGURES`). Errors
+are infinite if the trial was not survived."""
 
 
 def interquartile_table(trials: pd.DataFrame) -> Table | None:
-    """A row for each suite and variant, then for each of its trainings where there are several; None without suites."""
+    """A row per suite and variant, then one per training if there are several; None without suites."""
     rows, numbers = [], []
     played = trials[trials["kind"].isin(KINDS)]
     for suite, within in played.groupby("suite", sort=False):
@@ -69,7 +69,7 @@ def interquartile_table(trials: pd.DataFrame) -> Table | None:
 
 
 def blocks(trials: pd.DataFrame) -> dict[str, Block]:
-    """The trials of each variant in one suite, at the masses or cases that every training of all of them has played."""
+    """Trials of each variant in one suite, at the masses or cases common to all trainings of all variants."""
     trials = with_trainings(trials)
     trials = trials.assign(success=trials["succeeded"].astype(float))
     trials[list(ERRORS)] = trials[list(ERRORS)].where(trials["survived"], np.inf)
@@ -99,9 +99,9 @@ def figures(block: Block) -> dict[str, Bootstrapped]:
 
 
 def improvement(block: Block, reference: Block) -> Bootstrapped:
-    """Probability that a trial has a smaller norm of errors than one of the reference at the same mass; ties half."""
+    """Probability that a trial has a smaller error norm than one of the reference at the same mass; ties count half."""
     own, other = (np.array(list(one.values()))[..., -1].swapaxes(1, 2) for one in (block, reference))
-    own, other = own[:, :, None, None], other[None, None]  # (trainings, trials, its trainings, its trials, masses)
+    own, other = own[:, :, None, None], other[None, None]  # (trainings, trials) of own, then other; masses
     wins = ((own < other) + 0.5 * (own == other)).mean(axis=-1)
     drawn, worlds = _drawn(wins.shape[0], wins.shape[1])
     others, _ = _drawn(wins.shape[2], wins.shape[1], seed=1)
@@ -115,7 +115,7 @@ def improvement(block: Block, reference: Block) -> Bootstrapped:
 
 
 def _drawn(trainings: int, trials: int, seed: int = 0) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Trainings and worlds of each resample, with replacement: (resamples, trainings), (resamples, trials)."""
+    """Trainings and worlds drawn with replacement: (resamples, trainings), (resamples, trials)."""
     worlds = np.random.default_rng(0).integers(trials, size=(RESAMPLES, trials))
     return np.random.default_rng([seed, trainings]).integers(trainings, size=(RESAMPLES, trainings)), worlds
 

@@ -1,4 +1,4 @@
-"""Success in the heavy tasks, the joints at their limits, and the contact with the ground."""
+"""Tables of success in the heavy tasks, joint torques at their limits, and ground contact."""
 
 from collections.abc import Mapping
 
@@ -14,13 +14,13 @@ from iowbc.results.table import ABSENT, Cell, Column, Table, heads
 
 TYRE_MASS = 18.0
 PROBING = ("pushes", "impedance", "map")
-"""Kinds of trials that look for a limit or a response, not for how a task is done."""
+"""Kinds of trials that measure a limit or a response rather than task performance."""
 JOINTS_SHOWN = 5
-"""Joints in the table of torques, those most often at their limit first; the CSV has all."""
+"""Number of joints in the torque table, those most often at their limit first; the CSV file has all."""
 
 
 def success_table(summary: pd.DataFrame, labels: Mapping[str, str] = NO_LABELS) -> Table:
-    """The heavy tasks: how many trials succeeded, with Wilson's interval, beside the paper's rate."""
+    """Successful trials in the heavy tasks, with Wilson interval and the paper's rate."""
 
     def paper(row: pd.Series) -> str:
         rate = TYRE_SUCCESS.get(labels.get(row["variant"], row["variant"])) if row["mass"] == TYRE_MASS else None
@@ -42,7 +42,7 @@ def success_table(summary: pd.DataFrame, labels: Mapping[str, str] = NO_LABELS) 
 
 
 def joint_table(summary: pd.DataFrame) -> Table:
-    """Peak torque of the joints and how long they are at their limit, at the heaviest mass of each suite survived."""
+    """Peak joint torques and fraction of time at the limit, at the heaviest mass survived in each suite."""
     joints = [name.removeprefix("saturated/") for name in summary.columns if name.startswith("saturated/")]
     rows, numbers = [], []
     for _, row in heaviest(summary).iterrows():
@@ -73,8 +73,8 @@ CONTACT = (
 
 
 def contact_table(summary: pd.DataFrame) -> Table:
-    """Impacts on the ground, margins to tipping and slipping, smoothness of the action and effort of each variant, at
-    the heaviest mass of each suite survived."""
+    """Foot impacts, margins to tipping and slipping, action smoothness and joint effort of each variant, at the
+    heaviest mass survived in each suite."""
     chosen = heaviest(summary)
     rows = variant_rows(CONTACT, [(_load(row), row.to_frame().T) for _, row in chosen.iterrows()])
     caption = (
@@ -89,7 +89,7 @@ def contact_table(summary: pd.DataFrame) -> Table:
 
 
 def heaviest(summary: pd.DataFrame) -> pd.DataFrame:
-    """The row of the heaviest mass that each variant survived in each suite of tasks."""
+    """Rows of the heaviest mass that each variant survived in each suite, without `PROBING` trials."""
     survived = summary[(summary["survived"] > 0) & ~summary["kind"].isin(PROBING)]
     rows: pd.DataFrame = survived.sort_values("mass").groupby(["suite", "variant"], sort=False).tail(1)
     return rows.sort_index()

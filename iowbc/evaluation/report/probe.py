@@ -1,4 +1,4 @@
-"""Table and figure of the linear probe: the object's mass, and its value inferred from the policy's observations."""
+"""Table and figure of the linear probe: true object mass and mass inferred from the policy's observations."""
 
 from pathlib import Path
 
@@ -16,11 +16,11 @@ from iowbc.results.picture import write_figure
 from iowbc.results.table import Column, Table, heads, measured, write_table
 
 LINES = ("-", "--", ":")
-"""Lines of the sources, in order; s_priv, which holds the mass, has none. Of several variants two sources are shown."""
+"""Line styles of the sources, in order, without s_priv, which contains the mass. Several variants show two sources."""
 LOWEST = -0.25
-"""Least R² that the figure shows: less than 0 says less than the mean of all masses does."""
+"""Lower limit of R² in the figure. R² below 0 is worse than predicting the mean of all masses."""
 LEAST_TRIALS = 10
-"""Fewer trials that are still going at a time say nothing of R² there."""
+"""Minimum number of ongoing trials for R² at a time."""
 
 
 def write_probe(inferred: pd.DataFrame, folder: Path) -> pd.DataFrame:
@@ -35,7 +35,7 @@ def write_probe(inferred: pd.DataFrame, folder: Path) -> pd.DataFrame:
 
 
 def probe_table(inferred: pd.DataFrame) -> Table:
-    """Accuracy of the inferred mass: of one reading, of the mean of a second's, and of all of a trial's."""
+    """Accuracy of the inferred mass: of single readings, of means over a second and of means over a trial."""
     settled = inferred[inferred["settled"]]
     variants = variants_of(settled)
     numbers = [
@@ -69,7 +69,7 @@ def probe_table(inferred: pd.DataFrame) -> Table:
 
 
 def figures_of(found: pd.DataFrame) -> dict[str, float]:
-    """The figures of one source and variant, by name; R² also of means over a second and over a trial."""
+    """Statistics of one source and variant, by name; R² also of means over a second and over a trial."""
     mass, read = found["mass"].to_numpy(), found["inferred"].to_numpy()
     low, high = determination_interval(mass, read, found["trial"].to_numpy())
     seconds = found.assign(second=np.floor(found["seconds"])).groupby(["trial", "second"])[["mass", "inferred"]].mean()
@@ -89,7 +89,7 @@ def figures_of(found: pd.DataFrame) -> dict[str, float]:
 
 
 def probe_figure(inferred: pd.DataFrame) -> Figure:
-    """True against inferred mass in the trials tested, and R² against the time since the grasp."""
+    """Inferred over true mass in the test trials, and R² over the time since the grasp."""
     figure = Figure(figsize=(10.5, 4.9), layout="constrained")
     panels = list(figure.subplots(1, 2))
     source, settled = str(inferred["source"].iloc[0]), inferred[inferred["settled"]]
@@ -118,7 +118,7 @@ def _scatter(axes: Axes, chosen: pd.DataFrame, source: str) -> None:
 
 
 def _growth(axes: Axes, inferred: pd.DataFrame) -> None:
-    """R² over the trials that go on at each time."""
+    """R² over time, from the trials ongoing at each time."""
     variants = variants_of(inferred)
     sources = [each for each in dict.fromkeys(inferred["source"]) if each != PRIVILEGED]
     lines = LINES if len(variants) == 1 else LINES[:2]

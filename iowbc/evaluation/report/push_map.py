@@ -15,13 +15,13 @@ PANELS = {
     "E_v": ("E_v [m/s]", "viridis_r", 0.5),
     "push_force": ("push force [N]", "magma", None),
 }
-"""Columns that are drawn: title, colours, and end of the range from 0; the force up to the largest."""
+"""Columns to plot: title, colour map and upper end of the range from 0; None: the largest value."""
 DARK = 0.55
 """Brightness of a cell below which its number is white."""
 
 
 def map_table(summary: pd.DataFrame) -> Table:
-    """A row for each rolling resistance and variant, a column for each mass."""
+    """Table with a row per rolling resistance and variant and a column per mass."""
     chosen = summary[summary["kind"] == MAP]
     masses = sorted(chosen["mass"].unique())
     rows = []
@@ -40,7 +40,7 @@ def map_table(summary: pd.DataFrame) -> Table:
 
 
 def map_figure(summary: pd.DataFrame) -> Figure:
-    """A row of heat maps for each variant: success, E_v, push force; the lowest rolling resistance below."""
+    """One row of heat maps per variant: success, E_v, push force; rolling resistance increases upwards."""
     chosen = summary[summary["kind"] == MAP]
     variants = variants_of(chosen)
     figure = Figure(figsize=(4.2 * len(PANELS), 2.9 * len(variants) + 0.4), layout="constrained")

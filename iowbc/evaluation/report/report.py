@@ -1,4 +1,4 @@
-"""Tables and figures from the trials of one variant or of several, as `eval` writes them and `compare` joins them."""
+"""Tables and figures of the trials of one or several variants, for `eval` and `compare`."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -21,12 +21,12 @@ from iowbc.results.table import Table, write_table
 def write_report(
     trials: pd.DataFrame, folder: Path, capacity_rate: float, labels: Mapping[str, str] = NO_LABELS
 ) -> pd.DataFrame:
-    """Write `tables/` and `figures/` under `folder`; returns the summary, one row for each variant, suite and mass.
+    """Write `tables/` and `figures/` under `folder`; returns the summary, see `aggregate`.
 
-    trials: the long table of `trials.parquet`, one or several of them concatenated; `training_seed` tells the trainings
-    of a variant apart.
+    trials: long table of one `trials.parquet`, or several concatenated; `training_seed` identifies the trainings of a
+    variant.
     capacity_rate: success rate that a mass must reach to count as carried.
-    labels: `eval.label` of each variant that goes by another name here, to find the paper's numbers for it.
+    labels: `eval.label` of each variant with another name here, to find the paper's numbers for it.
     """
     tables, summary = folder / "tables", aggregate(trials)
     for table in report_tables(trials, summary, capacity_rate, labels):
@@ -49,7 +49,7 @@ def write_report(
 def report_tables(
     trials: pd.DataFrame, summary: pd.DataFrame, capacity_rate: float, labels: Mapping[str, str] = NO_LABELS
 ) -> list[Table]:
-    """All tables that the trials give; of walking and of joints only where somebody was to walk, or survived."""
+    """All tables that apply to the trials: walking only if it was commanded, joints only if a trial survived."""
     swept, kinds = suites_of(summary, *SWEPT), set(summary["kind"])
     walked = [suite for suite in swept if asks_for_steps(summary[summary["suite"] == suite])]
     several = len(with_trainings(trials)[["variant", TRAINING]].drop_duplicates()) > 1

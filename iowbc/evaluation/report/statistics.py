@@ -1,7 +1,7 @@
-"""Intervals for what few trials can say.
+"""Confidence intervals and tests for few trials.
 
-Trials of one number meet the same world (draws and commands) at every mass, in every suite and with every training:
-they are clusters, and what counts is how many worlds there are.
+Trials of one number share the same world (random draws and commands) at every mass, in every suite and with every
+training. They form a cluster, and the number of worlds determines the precision.
 """
 
 import functools
@@ -13,17 +13,17 @@ from numpy.typing import NDArray
 from scipy import stats
 
 CONFIDENCE = 0.95
-"""Of every interval in tables and figures."""
+"""Confidence level of every interval in tables and figures."""
 ENDS = ((1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2)
-"""Quantiles between which that part lies."""
+"""Quantiles of the ends of such an interval."""
 RESAMPLES = 2000
-"""Of a bootstrap."""
+"""Number of bootstrap resamples."""
 
 
 def wilson_interval(successes: int, trials: int, design: float = 1.0) -> tuple[float, float]:
-    """Wilson's score interval of a success rate; sensible at 0 and at all of few trials. Raises ValueError.
+    """Wilson's score interval of a success rate, valid also for 0 or all of few trials. Raises ValueError.
 
-    design: the trials count as so many times fewer (`design_effect`).
+    design: design effect, by which the number of trials is divided (`design_effect`).
     """
     if not 0 <= successes <= trials or trials == 0:
         raise ValueError(f"{successes} of {trials} is no rate: n trials have 0 to n successes, and n is at least 1")
@@ -34,10 +34,10 @@ def wilson_interval(successes: int, trials: int, design: float = 1.0) -> tuple[f
 
 
 def standard_error(values: NDArray[np.float64], worlds: NDArray[np.int64] | None = None) -> tuple[float, int]:
-    """Standard error of a mean, and the number of clusters that it rests on; NaN for fewer than two of them.
+    """Standard error of a mean, and number of clusters G; NaN for fewer than two.
 
-    s² = G / (G - 1) · Σ_g (Σ_i (x_gi - x̄))² / n², the cluster-robust variance: values (n,) of one world may depend on
-    each other in any way. Without `worlds` (n,) each value is its own, and s that of the textbook.
+    s² = G / (G - 1) · Σ_g (Σ_i (x_gi - x̄))² / n², the cluster-robust variance: values (n,) of one world may be
+    correlated in any way. Without `worlds`, (n,), values are independent and s is the usual standard error.
     """
     _, places = np.unique(np.arange(len(values)) if worlds is None else worlds, return_inverse=True)
     clusters = int(places.max(initial=-1)) + 1
@@ -48,19 +48,19 @@ def standard_error(values: NDArray[np.float64], worlds: NDArray[np.int64] | None
 
 
 def mean_half_width(values: NDArray[np.float64], worlds: NDArray[np.int64] | None = None) -> float:
-    """Half the width of Student's interval of a mean; NaN for fewer than two worlds, which say nothing of spread."""
+    """Half the width of Student's interval of a mean; NaN for fewer than two worlds."""
     error, clusters = standard_error(values, worlds)
     return math.nan if clusters < 2 else error * float(stats.t.ppf(ENDS[1], clusters - 1))
 
 
 def mean_p(values: NDArray[np.float64], worlds: NDArray[np.int64] | None = None) -> float:
-    """Student's p of a mean of zero, with worlds as clusters; NaN for fewer than two."""
+    """P-value of Student's t-test for a mean of zero, with worlds as clusters; NaN for fewer than two."""
     error, clusters = standard_error(values, worlds)
     return math.nan if clusters < 2 else float(2.0 * stats.t.sf(abs(values.mean()) / error, clusters - 1))
 
 
 def sign_flip_p(differences: NDArray[np.int64]) -> float:
-    """Exact p of whole differences (worlds,) that might as well have the other sign: McNemar's where all are ±1.
+    """Exact p-value of a sign-flip permutation test of integer differences (worlds,); McNemar's test if all are ±1.
 
     P(|Σ ±d| >= |Σ d|) over all signs, from the distribution of the sum.
     """
@@ -72,13 +72,13 @@ def sign_flip_p(differences: NDArray[np.int64]) -> float:
 
 
 def _flipped(chances: NDArray[np.float64], size: int) -> NDArray[np.float64]:
-    """The distribution of a sum, -k to k, with one more term that is size or -size."""
+    """Distribution of a sum, -k to k, after adding a term of +size or -size."""
     return 0.5 * (np.pad(chances, (0, 2 * size)) + np.pad(chances, (2 * size, 0)))
 
 
 def design_effect(successes: NDArray[np.bool_], worlds: NDArray[np.int64]) -> float:
-    """The factor by which fewer independent trials say as much as these (n,), of which some share a world: 1 to the
-    trials of a world. Where all went alike, as many as these: trials of one world might always do so."""
+    """Design effect: number of trials (n,) divided by the number of independent trials of equal precision; between 1
+    and the trials per world. The latter if all outcomes are equal, since trials of one world may always agree."""
     clusters = len(np.unique(worlds))
     most, values = len(successes) / clusters, successes.astype(np.float64)
     if clusters < 2 or not np.ptp(values):
@@ -88,7 +88,7 @@ def design_effect(successes: NDArray[np.bool_], worlds: NDArray[np.int64]) -> fl
 
 
 def determination(true: NDArray[np.float64], inferred: NDArray[np.float64]) -> float:
-    """R²: the part of the variance that is inferred; 0 for who says the mean, NaN where nothing varies."""
+    """R², the fraction of variance explained; 0 for a prediction of the mean, NaN if the true values do not vary."""
     spread = np.sum(np.square(true - true.mean()))
     return float(1.0 - np.sum(np.square(true - inferred)) / spread) if spread > 0 else math.nan
 
@@ -96,7 +96,7 @@ def determination(true: NDArray[np.float64], inferred: NDArray[np.float64]) -> f
 def determination_interval(
     true: NDArray[np.float64], inferred: NDArray[np.float64], group: NDArray[np.int64]
 ) -> tuple[float, float]:
-    """Bootstrap interval of R² where values of one group (n,) belong together: groups are drawn, not values."""
+    """Bootstrap interval of R², with resampling of groups (n,) rather than values."""
     terms = np.stack([np.ones_like(true), true, np.square(true), np.square(true - inferred)], axis=1)
     _, places = np.unique(group, return_inverse=True)
     sums = np.zeros((places.max() + 1, terms.shape[1]))
@@ -112,7 +112,7 @@ def determination_interval(
 
 
 def interquartile_mean(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Mean of the middle half of the last axis (..., n); of fewer than four values their mean."""
+    """Mean of the middle half of the last axis (..., n); plain mean of fewer than four values."""
     return np.asarray(stats.trim_mean(values, 0.25, axis=-1), np.float64)
 
 
@@ -124,7 +124,7 @@ class Bootstrapped(NamedTuple):
     high: float
 
     def named(self, name: str) -> dict[str, float]:
-        """Its columns in a table of numbers."""
+        """Columns for a table of numbers."""
         return {name: self.value, f"{name}_low": self.low, f"{name}_high": self.high}
 
 
@@ -135,5 +135,5 @@ def bootstrapped(value: float | NDArray[np.float64], resampled: NDArray[np.float
 
 
 def root_mean_square(true: NDArray[np.float64], inferred: NDArray[np.float64]) -> float:
-    """Of the errors, in the unit of the values."""
+    """Root mean square of the errors, in the unit of the values."""
     return float(np.sqrt(np.mean(np.square(true - inferred))))

@@ -1,1 +1,1 @@
-"""Trials: plan, play and measurement."""
+"""Trials: planning, rollout and metrics."""

@@ -15,7 +15,7 @@ ERRORS = ("E_alpha", "E_h", "E_v", "E_psi")
 
 
 class Deviations(NamedTuple):
-    """Deviations of a trial from a command, in the order of `ERRORS`, one row a control step, each of shape (T,)."""
+    """Deviations of a trial from a command, in the order of `ERRORS`, one row per control step, each of shape (T,)."""
 
     pitch: Array
     height: Array
@@ -24,18 +24,18 @@ class Deviations(NamedTuple):
     heading: Array
 
     def means(self, suffix: str = "", part: Mask | slice = slice(None)) -> dict[str, float]:
-        """The four errors over a part of the trial, by `ERRORS` and a suffix; NaN where the part is empty."""
+        """Mean errors over a part of the trial, named by `ERRORS` and a suffix; NaN if the part is empty."""
         parts = {f"{name}{suffix}": values[part] for name, values in zip(ERRORS, self, strict=True)}
         return {name: float(np.mean(values)) if len(values) else np.nan for name, values in parts.items()}
 
 
 def start_heading(trace: Trace) -> float:
-    """Heading reference before the first step [rad]; the trace begins after it."""
+    """Heading reference before the first step [rad]; the first row of the trace is after that step."""
     return float(trace.heading_reference[0] - trace.commanded_velocity[0, YAW_RATE] * trace.dt)
 
 
 def deviations_from_given(trace: Trace, given: Array, window: int) -> Deviations:
-    """Against the commands (T, 11) as given; `window`: control steps over which v_sys is averaged, one gait period."""
+    """Deviations from the original commands (T, 11); `window`: control steps of a gait period, to average v_sys."""
     heading = start_heading(trace) + trace.dt * np.cumsum(given[:, YAW_RATE])
     return Deviations(
         pitch=np.abs(trace.torso_pitch - given[:, PITCH]),
@@ -46,7 +46,7 @@ def deviations_from_given(trace: Trace, given: Array, window: int) -> Deviations
 
 
 def deviations_from_clamped(trace: Trace, window: int) -> Deviations:
-    """Against the commands as they were clamped to what is feasible and limited in their rate."""
+    """Deviations from the commands after feasibility clamping and rate limits."""
     return Deviations(
         pitch=np.abs(trace.torso_pitch - trace.torso_pitch_command),
         height=np.abs(trace.pelvis_height - trace.height_command),
@@ -84,6 +84,6 @@ def moving_average(values: Array, window: int) -> Array:
 def error_norm(errors: Array) -> Array:
     """Euclidean norm of the paper's four errors in SI units, shape (..., 4) to (...).
 
-    The paper's "norm error" is not defined there; this is the plainest reading.
+    The paper does not define its "norm error"; this is the simplest reading.
     """
     return np.asarray(np.linalg.norm(errors, axis=-1))

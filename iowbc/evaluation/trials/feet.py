@@ -1,4 +1,4 @@
-"""Figures of the feet: slip, drift, clearance, impacts, and margins to tipping and slipping."""
+"""Foot metrics: slip, drift, clearance, impacts, and margins to tipping and slipping."""
 
 import numpy as np
 
@@ -6,23 +6,22 @@ from iowbc.arrays import Mask
 from iowbc.evaluation.trials.trace import Trace
 
 SHORTEST_WALK = 0.5
-"""Slip a metre has a value where at least this was walked [m]."""
+"""Minimum walked distance for slip per metre [m]."""
 SHORTEST_SWING = 0.1
-"""A foot touches down after it was in the air for at least this long; less is chatter of the contact [s]."""
+"""Minimum time in the air before a touchdown; shorter intervals are contact chatter [s]."""
 LOW, HIGH = 5.0, 95.0
-"""Percentiles of the worse end of what varies within a trial."""
+"""Percentiles for the worse end of a quantity within a trial."""
 
 
 def foot_metrics(trace: Trace, load: float, walked: float) -> dict[str, float]:
-    """Slip of loaded feet and clearance of swinging ones.
+    """Slip of loaded feet and clearance of swinging feet.
 
     load: vertical force from which a foot counts as loaded [N]; walked: length of the base's path [m].
 
-    `foot_slip`: way that soles slide at their centres of pressure while loaded, back and forth, both feet [m]; rolling
-    over an edge of the foot is none. `foot_slip_peak`: the longest in one stance [m]. `foot_drift`: how far soles are
-    at the end of a stance from where it began, summed over the stances of both feet [m]. `_per_metre`: of either, a
-    metre walked; NaN where hardly any was. `swing_clearance_left`, `_right`: mean over the swings of the highest the
-    sole came [m]; zero without a swing.
+    `foot_slip`: path length of sliding at the centres of pressure of loaded soles, both feet [m]; rolling over an edge
+    of the foot does not count. `foot_slip_peak`: largest slip in one stance [m]. `foot_drift`: displacement of a sole
+    during a stance, summed over the stances of both feet [m]. `_per_metre`: either per metre walked; NaN below
+    `SHORTEST_WALK`. `swing_clearance_left`, `_right`: maximum sole height, mean over swings [m]; zero without a swing.
     """
     loaded = trace.foot_load >= load
     slid = trace.foot_slide * loaded * trace.dt
@@ -55,8 +54,8 @@ def ground_metrics(trace: Trace, load: float, friction: float) -> dict[str, floa
     last control period before it touches the ground [m/s]; NaN without a touchdown. `foot_force_peak`: largest force of
     the ground on a foot in any physics step [N]. `pressure_margin`: distance of the centre of pressure from the edge of
     the sole, mean weighted by the load, and `pressure_margin_low`, its 5th percentile [m]. `friction_use`: horizontal
-    force as a part of what friction allows at the foot's load, mean weighted by the load, and `friction_use_high`, its
-    95th percentile. NaN where no foot was loaded.
+    force as a fraction of the friction limit at the foot's load, mean weighted by the load, and `friction_use_high`,
+    its 95th percentile. NaN if no foot was loaded.
     """
     shortest = round(SHORTEST_SWING / trace.dt)
     speeds = [
@@ -80,6 +79,6 @@ def ground_metrics(trace: Trace, load: float, friction: float) -> dict[str, floa
 
 
 def runs(mask: Mask) -> list[slice]:
-    """The stretches in which a mask (T,) is true, in order."""
+    """Intervals in which a mask (T,) is true, in order."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
     return [slice(int(first), int(last)) for first, last in edges.reshape(-1, 2)]

@@ -1,4 +1,4 @@
-"""The mechanical impedance that a robot shows to a sinusoidal pull on the object that it holds."""
+"""Mechanical impedance of the robot to a sinusoidal pull on the object that it holds."""
 
 from typing import NamedTuple
 
@@ -10,7 +10,7 @@ from iowbc.task.episodes import PlannedPull
 
 
 class Apparent(NamedTuple):
-    """A mass on a spring and a damper, m ẍ + c ẋ + k x = F, that answers pulls as the robot with its object does."""
+    """Equivalent mass-spring-damper, m ẍ + c ẋ + k x = F, of the robot with its object."""
 
     stiffness: float
     """k [N/m]."""
@@ -24,8 +24,8 @@ def impedance(force: Array, position: Array, frequency: float, dt: float) -> com
     """Z = F / v at a frequency [Hz], complex [N·s/m]: i·ω·m of a mass, c of a damper, k / (i·ω) of a spring.
 
     force: along the pull, held over each control period at its value in the middle; position: at the end of the
-    period; (T,) [N, m]. The amplitudes are a least-squares fit of sine and cosine beside a drift of second order, which
-    the robot has of its own. NaN for what does not move at all.
+    period; (T,) [N, m]. The amplitudes are a least-squares fit of sine and cosine together with a quadratic drift, for
+    the robot's own motion. NaN without any motion.
     """
     time = dt * np.arange(len(force))
     angle = 2.0 * np.pi * frequency * time
@@ -37,10 +37,10 @@ def impedance(force: Array, position: Array, frequency: float, dt: float) -> com
 
 
 def impedance_metrics(trace: Trace, pull: PlannedPull | None) -> dict[str, float]:
-    """Of the object's centre to a pull: `impedance_real`, `impedance_imag`, `impedance_magnitude` [N·s/m] and
-    `impedance_phase` [rad], from -π/2 (spring) over 0 (damper) to π/2 (mass).
+    """Impedance of the object's centre to a pull: `impedance_real`, `impedance_imag`, `impedance_magnitude` [N·s/m]
+    and `impedance_phase` [rad], from -π/2 (spring) over 0 (damper) to π/2 (mass).
 
-    The first period, in which the motion builds up, is left out. NaN without a pull, and where the trial ended before.
+    The first period is excluded as transient. NaN without a pull, or if the trial ended before the end of the pull.
     """
     value = complex(np.nan, np.nan)
     if pull is not None:
@@ -62,9 +62,9 @@ def impedance_metrics(trace: Trace, pull: PlannedPull | None) -> dict[str, float
 
 
 def apparent(frequency: Array, value: Array) -> Apparent:
-    """The mass, spring and damper whose impedances are nearest to `value` (k,), complex, at frequencies (k,) [Hz].
+    """Mass, spring and damper fitted to impedances `value` (k,), complex, at frequencies (k,) [Hz].
 
-    Least squares in Z = c + i (ω m - k / ω). Of fewer than two frequencies mass and spring cannot be told apart: NaN.
+    Least squares in Z = c + i (ω m - k / ω). With fewer than two frequencies, mass and stiffness are undetermined: NaN.
     """
     angular = 2.0 * np.pi * frequency
     if len(np.unique(frequency)) < 2:

@@ -8,15 +8,15 @@ from iowbc.evaluation.trials.feet import HIGH
 from iowbc.evaluation.trials.trace import Trace
 
 SETTLING = 1.0
-"""The first second, in which the weight comes to bear, is left out [s]."""
+"""Initial time excluded while the load is taken up [s]."""
 
 
 def load_metrics(trace: Trace, weight: float, least: float) -> dict[str, float]:
-    """Shares of a held object's weight [N], means over the trial without its first second; NaN where nothing is held.
+    """Fractions of a held object's `weight` [N], means over the trial without its first second; NaN if nothing is held.
 
     `hand_weight_share`: the hands' vertical force over the weight. `partner_weight_share`: the partner's.
-    `weight_in_hands`: the hands' part of what the robot carries at all, links included; NaN where that is less than
-    `least` [N], and a touch of the torso would be several times as much.
+    `weight_in_hands`: the hands' part of the load on the robot, contacts of other links included; NaN if that load is
+    not above `least` [N], since a touch of the torso would then dominate.
     """
     begin = round(SETTLING / trace.dt)
     if not weight > 0 or len(trace) <= begin:
@@ -32,7 +32,7 @@ def load_metrics(trace: Trace, weight: float, least: float) -> dict[str, float]:
 
 
 def interaction_metrics(trace: Trace, window: int) -> dict[str, float]:
-    """Horizontal forces at hands and handle, work on the partner, and how far its motion is from being followed.
+    """Horizontal forces at hands and handle, work on the partner, and velocity error to the partner.
 
     window: control steps of a gait period.
 
@@ -58,15 +58,15 @@ def interaction_metrics(trace: Trace, window: int) -> dict[str, float]:
 def push_metrics(
     trace: Trace, directions: Array, window: int, friction: float, resistance: float, part: float
 ) -> dict[str, float]:
-    """Force of the hands along the command, where one is given; NaN without one, or without an object.
+    """Force of the hands along the commanded motion; NaN without commanded motion or without an object.
 
-    directions: of the commanded motion in the world, zero while it stands, (T or more, 2); window: control steps of a
-    gait period; friction: coefficient between feet and ground; resistance: of the rolling object [N]; part: of the
-    largest possible force, that counts as pushing.
+    directions: of the commanded motion in the world frame, zero in standing, (T or more, 2); window: control steps of a
+    gait period; friction: coefficient between feet and ground; resistance: of the rolling object [N]; part: fraction of
+    the largest possible force that counts as pushing.
 
-    `push_force`: mean horizontal force of the hands on the object along the command [N]. `push_force_share`: part of
-    the time in which it is at least `part` of what can be pushed with: friction times the vertical force of the
-    ground, or the resistance of the object where that is smaller; forces averaged over a gait period.
+    `push_force`: mean horizontal force of the hands on the object along the command [N]. `push_force_share`: fraction
+    of the time in which it is at least `part` of the largest possible force, the smaller of friction times the vertical
+    ground force and the object's resistance; forces averaged over a gait period.
     """
     directions = directions[: len(trace)]
     commanded = directions.any(axis=1)
@@ -84,7 +84,7 @@ def hand_forces(trace: Trace) -> Array:
 
 
 def _spread(name: str, sizes: Array) -> dict[str, float]:
-    """Of the sizes of one force (T,), or of the greater of several (T, k)."""
+    """Mean, 95th percentile and peak of a force magnitude (T,); for several (T, k), the largest of each."""
     return {
         f"{name}_mean": float(np.mean(sizes, axis=0).max()),
         f"{name}_p95": float(np.percentile(sizes, HIGH, axis=0).max()),

@@ -1,4 +1,4 @@
-"""From the signals of a trial to its row of figures."""
+"""Metrics of a trial from its signals."""
 
 import numpy as np
 
@@ -16,13 +16,13 @@ from iowbc.task.episodes import Episode
 
 
 def trial_metrics(recipe: Recipe, robot: Robot, episode: Episode, outcome: Outcome) -> dict[str, float]:
-    """Everything that is measured in a trial.
+    """All metrics of a trial.
 
-    The paper's errors are against the command as given: over the whole trial (`E_v`), over the part in which
-    steps are asked for (`E_v_moving`), against the command as clamped to what is feasible (`E_v_clamped`), and, from
-    the script alone, for a robot that stands still (`still_E_v`, `still_E_v_moving`). `E_v_raw` is without averaging,
-    `E_v_raw_moving` over the part in which steps are asked for. `transport_robot`, `_object`: parts of the commanded
-    way, of length `commanded_distance`, that they cover; `object_beside`: see `beside` [m]. Raises ValueError for an
+    The paper's errors are relative to the original command: over the whole trial (`E_v`), while stepping is commanded
+    (`E_v_moving`) and, from the script alone, for a robot that stands still (`still_E_v`, `still_E_v_moving`).
+    `E_v_clamped` is relative to the command after feasibility clamping. `E_v_raw` is without averaging,
+    `E_v_raw_moving` the same while stepping is commanded. `transport_robot`, `_object`: fractions of the commanded
+    path, of length `commanded_distance`, that they cover; `object_beside`: see `beside` [m]. Raises ValueError for an
     episode without a command sequence or without a single step.
     """
     task, asked, script, trace = recipe.task, recipe.eval, episode.script, outcome.trace
@@ -70,11 +70,10 @@ def trial_metrics(recipe: Recipe, robot: Robot, episode: Episode, outcome: Outco
 
 
 def effort_metrics(trace: Trace, robot: Robot) -> dict[str, float]:
-    """Costs of the trial: torques, energy, forces at hands and partner, jerk of torso and object, of the action the
-    root mean square of its second difference over a control period and the support joints [rad].
+    """Effort in the trial: torques, energy, forces at hands and partner, jerk of torso and object, and the root mean
+    square of the action's second difference over time and support joints [rad].
 
-    `torque_rms/<joint>`: root mean square of a joint's torque as a part of its limit, and `torque_rms`, the largest of
-    them.
+    `torque_rms/<joint>`: RMS torque of a joint as a fraction of its limit; `torque_rms`: the largest of these.
     """
     grips = np.linalg.norm(trace.grip_force.reshape(-1, 2, 3), axis=2)
     peak, saturated = np.abs(trace.joint_torque).max(axis=0), trace.joint_saturation.mean(axis=0)
@@ -105,7 +104,7 @@ def second_difference(values: Array) -> float:
 
 
 def jerk(position: Array, dt: float) -> float:
-    """Root mean square of the third difference of a path (T, 3), over a control period each [m/s³], or NaN."""
+    """Root mean square jerk of a path (T, 3), by third differences [m/s³]; NaN for fewer than four rows."""
     if len(position) < 4:
         return np.nan
     return float(np.sqrt(np.mean(np.sum(np.square(np.diff(position, 3, axis=0) / dt**3), axis=1))))

@@ -1,4 +1,4 @@
-"""The trials of an evaluation: sweeps, cases, seeds, and the quantities that are held fixed in each."""
+"""Planned trials of an evaluation: sweeps, cases, seeds and fixed quantities."""
 
 import itertools
 import math
@@ -20,37 +20,37 @@ from iowbc.task.episodes import Episode, PlannedPull, PlannedPush
 NO_OBJECT = "no object"
 """Case of a sweep in the scene without an object."""
 SPLITS = {"development": 0, "test": 2**33}
-"""Offset of the seeds of each split: no seed of a recipe is as great, so that the two never meet."""
+"""Seed offset of each split. All seeds of recipes are smaller, so that the splits never overlap."""
 UNDISTURBED = {"impulse_scale": 0.0, "push_scale": 0.0}
 """Factors on the impulses on the object and the pushes on the base."""
 DIRECTIONS: dict[str, tuple[float, float]] = {
     name: (math.cos(place * math.pi / 4), math.sin(place * math.pi / 4)) for place, name in enumerate(EIGHT)
 }
-"""Of pushes on the base, heading frame: forward, and on to the left by an eighth of a turn each."""
+"""Directions of pushes on the base, heading frame: from forward counterclockwise in steps of 45°."""
 AXES = {"x": (1.0, 0.0), "y": (0.0, 1.0)}
-"""Of pulls on the object, heading frame."""
+"""Directions of pulls on the object, heading frame."""
 
 
 @dataclass(frozen=True)
 class Trial:
-    """One trial: where it stands in the tables, and the episode it plays."""
+    """One trial: its place in the tables and its episode."""
 
     kind: str
     """"lifting", "pushing", "squeezing", "heavy", "stagnation", "robustness", "pushes", "compliance", "impedance",
-    "map", or another word for what is asked."""
+    "map", or the name of another sweep."""
     suite: str
-    """The table it belongs to: the kind, with what partner, and whether undisturbed beside disturbed ones."""
+    """Name of its table: kind, partner and, for sweeps without the evaluation's disturbances, "undisturbed"."""
     case: str
-    """Name within the suite. Of a sweep that of the suite, or "no object"; of compliance the partner's behaviour or
-    that of the blocked crate; of impedance like "x 0.5 Hz"; of a map like "μ 0.06"; of pushes the direction, with
-    ", walking" where the robot walks."""
+    """Name within the suite. Sweeps: name of the suite, or "no object"; compliance: behaviour of the partner or name of
+    the blocked crate; impedance: such as "x 0.5 Hz"; map: such as "μ 0.06"; pushes: direction, with ", walking" if the
+    robot walks."""
     mass: float
     """Object mass [kg]; 0 without one."""
     number: int
     """0, 1, ...: trials of the same number have the same seed and drawn script at every mass and in every variant."""
     episode: Episode
     impulse: float = 0.0
-    """Of the push on the base [N·s]; 0 without one."""
+    """Impulse on the base [N·s]; 0 without a push."""
 
 
 def command_script(sequence: Sequence[Segment], commands: Commands) -> CommandScript:
@@ -73,16 +73,14 @@ def command_script(sequence: Sequence[Segment], commands: Commands) -> CommandSc
 
 
 def sequence_for(recipe: Recipe, scene: str, own: Sequence[Segment] = ()) -> tuple[Segment, ...]:
-    """The fixed commands in a scene: a sweep's or case's own, or else the recipe's, or else those of lifting or
-    pushing."""
+    """Fixed commands in a scene: `own` of a sweep or case, else the recipe's, else defaults of lifting or pushing."""
     return tuple(own) or recipe.eval.sequence or (PUSHING if _pushed(recipe, scene) else LIFTING)
 
 
 def script_for(
     recipe: Recipe, scene: str, seed: int, own: Sequence[Segment] = (), repetitions: int = 1
 ) -> CommandScript:
-    """The commands of the trial with a seed: fixed ones where a sequence is given or no scripts are drawn, else those
-    drawn from the seed."""
+    """Commands of a trial: fixed if a sequence is given or the recipe has no random scripts, else drawn from `seed`."""
     scripts, commands = recipe.eval.scripts, recipe.task.commands
     if own or recipe.eval.sequence or scripts is None:
         return command_script(sequence_for(recipe, scene, own) * repetitions, commands)
@@ -109,8 +107,8 @@ def planned_episode(
     push: PlannedPush | None = None,
     pull: PlannedPull | None = None,
 ) -> Episode:
-    """A trial with an object of a mass [kg], 0 in the scene without one; `fixed`: quantities that are held, by name.
-    All else is drawn."""
+    """Episode of a trial with an object of a mass [kg], 0: the scene without one; `fixed`: fixed quantities by name.
+    All others are random."""
     held = dict(fixed) if mass == 0 else {**fixed, "object_mass": mass}
     return Episode(FREE if mass == 0 else scene, seed, script.duration, held, script, push, pull)
 
@@ -129,10 +127,10 @@ def _cell(
     pull: PlannedPull | None = None,
     impulse: float = 0.0,
 ) -> Iterator[Trial]:
-    """One cell of the tables: trials that differ in their seeds alone.
+    """Trials of one table cell, which differ only in seed.
 
-    place: kind, suite and case; mass: of the object [kg]; fixed, push, pull: see `planned_episode`; sequence: its own
-    commands, see `script_for`; trials: their number, by default `eval.trials`; impulse: of the push [N·s].
+    place: kind, suite and case; mass: of the object [kg]; fixed, push, pull: see `planned_episode`; sequence: own
+    commands, see `script_for`; trials: number of trials, default `eval.trials`; impulse: of the push [N·s].
     """
     for number in range(trials or recipe.eval.trials):
         seed = trial_seed(recipe.eval, number)
@@ -144,7 +142,7 @@ def _cell(
 def held_fixed(
     partner_share: float | None, rolling_resistance: float | None = None, *, disturbed: bool
 ) -> dict[str, float]:
-    """The randomised quantities that trials hold, by name; None draws one."""
+    """Randomised quantities with fixed values, by name; None leaves a quantity random."""
     held = {"object_ground_friction": rolling_resistance, "partner_share": partner_share}
     calm = {} if disturbed else UNDISTURBED
     return calm | {name: value for name, value in held.items() if value is not None}
@@ -152,20 +150,20 @@ def held_fixed(
 
 @dataclass(frozen=True)
 class PlannedSweep:
-    """A sweep with one partner's share."""
+    """A mass sweep at one share of the partner."""
 
     recipe: Recipe
     kind: str
     sweep: MassSweep
-    """As it is with that share (`Sweep.at`)."""
+    """The sweep at that share (`Sweep.at`)."""
     disturbed: bool
-    """True where impulses and pushes act."""
+    """True if random impulses and pushes are enabled."""
     no_object: bool = False
-    """True where the row without an object belongs to it."""
+    """True if the sweep includes the row without an object."""
 
     @property
     def partner_share(self) -> float | None:
-        """Share of the partner; None draws it."""
+        """Share of the partner; None: random."""
         return self.sweep.partner_shares[0]
 
     @property
@@ -178,7 +176,7 @@ class PlannedSweep:
 
     @property
     def masses(self) -> tuple[float, ...]:
-        """The masses that the recipe names [kg], none below what the object can have."""
+        """Masses of the recipe [kg], raised to the object's smallest mass."""
         thing = getattr(self.recipe.simulation.scenes, self.sweep.scene).object
         return tuple(dict.fromkeys(max(mass, thing.smallest_mass) for mass in self.sweep.masses))
 
@@ -187,20 +185,20 @@ class PlannedSweep:
         return (self.trials((0.0,), NO_OBJECT) if self.no_object else []) + self.trials(self.masses)
 
     def trials(self, masses: Iterable[float], case: str | None = None) -> list[Trial]:
-        """The trials at some masses [kg]; `case`: another one than that of the suite's name."""
+        """The trials at given masses [kg]; `case`: default the name of the suite."""
         place, own = (self.kind, self.suite, case or self.suite), self.sweep
         fixed = held_fixed(self.partner_share, own.rolling_resistance, disturbed=self.disturbed) | own.fixed
         cells = (_cell(self.recipe, place, own.scene, mass, fixed, own.sequence) for mass in masses)
         return list(itertools.chain.from_iterable(cells))
 
     def heavier(self, last: float) -> float | None:
-        """The next mass past the end of the sweep [kg], or None where the recipe stops."""
+        """Next mass beyond the end of the sweep [kg], or None at the recipe's limit."""
         beyond = self.sweep.beyond
         return None if beyond is None or last + beyond.step > beyond.limit else last + beyond.step
 
 
 def planned_sweeps(recipe: Recipe) -> list[PlannedSweep]:
-    """The sweeps, each with every share of the partner's, then those without disturbances."""
+    """Sweeps of each kind at every share of the partner, then those without disturbances."""
     evaluation, planned = recipe.eval, []
     for kind, sweep in evaluation.sweeps.items():
         alone = 0.0 if 0.0 in sweep.partner_shares else sweep.partner_shares[0]
@@ -233,7 +231,7 @@ def case_trials(recipe: Recipe) -> Iterator[Trial]:
 
 
 def push_trials(recipe: Recipe) -> Iterator[Trial]:
-    """The trials in which the base is pushed, standing and walking, at every size in every direction."""
+    """Trials with a push on the base, standing and walking, at every impulse in every direction."""
     robustness, fixed = recipe.eval.robustness, UNDISTURBED | {"partner_share": 0.0}
     ladders = {} if robustness is None else {"": robustness.pushes, ", walking": robustness.walking_pushes}
     for words, ladder in ladders.items():
@@ -249,7 +247,7 @@ def push_trials(recipe: Recipe) -> Iterator[Trial]:
 
 
 def compliance_trials(recipe: Recipe) -> Iterator[Trial]:
-    """The trials with partners of every behaviour and before a blocked crate, then those with sinusoidal pulls."""
+    """Trials with every partner behaviour, then with a blocked crate, then with sinusoidal pulls."""
     asked = recipe.eval.compliance
     if asked is None:
         return
@@ -274,7 +272,7 @@ def compliance_trials(recipe: Recipe) -> Iterator[Trial]:
 
 
 def map_trials(recipe: Recipe) -> Iterator[Trial]:
-    """The pushes at every rolling resistance and mass."""
+    """Trials of pushing at every rolling resistance and mass."""
     asked = recipe.eval.map
     if asked is None:
         return

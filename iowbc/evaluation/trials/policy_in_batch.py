@@ -1,4 +1,4 @@
-"""A policy that computes in the shape of a larger batch."""
+"""Policy evaluation at a fixed batch size."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -12,14 +12,14 @@ if TYPE_CHECKING:
 
 
 class PolicyInBatch:
-    """A policy for some environments that computes in the shape of a larger batch, with them at given places.
+    """Policy for some environments, evaluated in a batch of fixed size with these environments in given rows.
 
-    Matrix products round differently for other shapes; with this, a trial is the same bit for bit whichever trials of
-    its sweep it is played with.
+    The rounding of matrix products depends on their shape. At a fixed size, a trial is bit-identical whichever other
+    trials are in its batch.
     """
 
     def __init__(self, policy: Policy, size: int, places: NDArray[np.int64]) -> None:
-        """`places` (n,): the environments' rows in the batch of `size`."""
+        """`places` (n,): rows of the environments in the batch of `size`."""
         self.policy, self.size, self.places = policy, size, places
 
     def reset(self, which: NDArray[np.bool_]) -> None:
@@ -35,5 +35,5 @@ class PolicyInBatch:
 
 
 def in_batch(policy: Policy, row: "pd.Series[Any]") -> PolicyInBatch:
-    """The policy as it acted in the trial of a row of the long table, for that trial alone."""
+    """The policy for a single trial, in the batch size and row of its row of the long table."""
     return PolicyInBatch(policy, int(row["batch_size"]), np.array([int(row["batch_row"])]))

@@ -1,4 +1,4 @@
-"""The whole evaluation: trials of many masses and suites at once over all workers, resumable batch by batch."""
+"""Evaluation protocol: trials of all suites in batches over all workers, resumable after each batch."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -31,10 +31,9 @@ from iowbc.task.vector.setup import shares
 
 
 def evaluated_world(specification: Specification) -> Specification:
-    """Where the trials of a recipe take place: in the world that `eval.simulation` pins, or else in the training's,
-    and in the engine of `eval.engine`.
-    Where the policy does not see s_priv, that has no part that is in a user's file. The robot of a public controller
-    has its gains and default posture. Raises StageFailed where such a controller cannot be used."""
+    """Specification of a recipe's trials: simulation of `eval.simulation`, default that of training, and engine of
+    `eval.engine`. Unless the policy is a teacher, s_priv has no user-defined parts. With a public controller, the robot
+    has its gains and default posture. Raises StageFailed if such a controller cannot be used."""
     recipe = specification.recipe
     world = specification if recipe.eval.policy == "teacher" else specification.deployed
     if recipe.eval.simulation is not None:
@@ -49,7 +48,7 @@ def evaluated_world(specification: Specification) -> Specification:
 
 
 def _with_trial_scenes(recipe: Recipe) -> Recipe:
-    """The recipe with the scenes of `eval.scenes` and what the arms have to know of them."""
+    """The recipe with the scenes of `eval.scenes`, their grasps and loads."""
     further, simulation, task = recipe.eval.scenes, recipe.simulation, recipe.task
     references = task.references
     grasps = {**dict(references.grasps), **{name: own.wrists for name, own in further.items()}}
@@ -67,8 +66,8 @@ def _with_trial_scenes(recipe: Recipe) -> Recipe:
 
 
 def evaluated_policy(world: Specification, folder: Path | None) -> Policy:
-    """The policy that `eval.policy` names: a trained one, the model-based rival, or a public controller; `folder`: the
-    artifact of the stage that trained it, where one did."""
+    """The policy of `eval.policy`: a trained policy, the model-based baseline, or a public controller; `folder`:
+    artifact of the stage that trained it, or None."""
     if folder is not None:
         return load_policy(folder)
     robot, recipe = load_robot(world.robot), world.recipe
@@ -83,13 +82,13 @@ def evaluated_policy(world: Specification, folder: Path | None) -> Policy:
 
 
 Batches = Mapping[str, Sequence[Trial]]
-"""Trials that are played together, by the name of their batch."""
+"""Trials of each batch, by name of the batch."""
 
 
 class Protocol:
-    """Plays the trials of a recipe's `eval` section; finished batches are kept in `work` and not played again.
+    """Plays the trials of a recipe's `eval` section; finished batches are cached in `work`.
 
-    First all trials that the recipe names, then, round by round, those past the end of the sweeps that still succeed.
+    First come all trials of the recipe, then, one mass per round, those beyond the end of sweeps that still succeed.
     """
 
     def __init__(
@@ -103,8 +102,8 @@ class Protocol:
         progress: Callable[[float, float, str], None] = lambda done, total, note: None,
         elsewhere: Callable[[Batches], Iterator[tuple[str, bytes]]] | None = None,
     ) -> None:
-        """`progress` receives trials done, trials known of, and what is played. `elsewhere` plays batches on other
-        machines and yields the name of each and what `played` returns."""
+        """`progress` receives the trials done, the trials planned so far, and a note. `elsewhere` plays batches on
+        other machines and yields the name and the result of `played` of each."""
         self.world, self.policy = world, policy
         self.work, self.workers = work, workers
         self.interrupted, self.progress = interrupted, progress
@@ -130,7 +129,7 @@ class Protocol:
         return _in_order(pd.concat(tables, ignore_index=True), list(dict.fromkeys(trial.suite for trial in named)))
 
     def _round(self, number: int, trials: Sequence[Trial]) -> pd.DataFrame:
-        """The table of some trials, played batch by batch."""
+        """Play trials in batches; returns their table."""
         self.total += len(trials)
         found = batched_by_duration(trials, self.world.recipe.eval.batch)
         batches = {f"trials-{number}-{place}": batch for place, batch in enumerate(found)}
@@ -140,7 +139,7 @@ class Protocol:
         return pd.concat(tables, ignore_index=True)
 
     def _play_elsewhere(self, elsewhere: Callable[[Batches], Iterator[tuple[str, bytes]]], batches: Batches) -> None:
-        """Have the batches played that are missing."""
+        """Play the missing batches on other machines."""
         missing = {name: batch for name, batch in batches.items() if newest_checked(self._file(name), name)[0] is None}
         ready = sum(len(batch) for name, batch in batches.items() if name not in missing)
         for name, content in elsewhere(missing):
@@ -149,7 +148,7 @@ class Protocol:
             self.progress(self.done + ready, self.total, _suites(missing[name]))
 
     def _file(self, name: str) -> Path:
-        """Where a finished batch is kept."""
+        """Cache file of a finished batch."""
         return self.work / f"{name}.batch"
 
     def _batch(self, name: str, trials: Sequence[Trial]) -> pd.DataFrame:
@@ -177,7 +176,7 @@ def played(
     interrupted: Callable[[], bool] = lambda: False,
     progress: Callable[[float], None] = lambda seconds: None,
 ) -> bytes:
-    """Play one batch; its rows of the long table as a Parquet file. See `play_episodes`."""
+    """Play one batch; returns its rows of the long table as a Parquet file. See `play_episodes`."""
     recipe, size, places = world.recipe, world.recipe.eval.batch, np.arange(len(trials))
     in_batch, episodes = PolicyInBatch(policy, size, places), [trial.episode for trial in trials]
     outcomes = play_episodes(world, episodes, in_batch, workers=workers, interrupted=interrupted, progress=progress)
@@ -187,7 +186,7 @@ def played(
 
 
 def batched_by_duration(trials: Sequence[Trial], size: int) -> Iterator[list[Trial]]:
-    """Trials of one duration in nearly equal batches of at most `size`, so that none waits long for another to end."""
+    """Nearly equal batches of at most `size` trials, all of one duration, so that no trial waits for a longer one."""
     durations = [round(trial.episode.duration, 3) for trial in trials]
     for duration in sorted(set(durations)):
         alike = [trial for trial, own in zip(trials, durations, strict=True) if own == duration]
@@ -204,6 +203,6 @@ def _succeeds(table: pd.DataFrame, suite: str, mass: float) -> bool:
 
 
 def _in_order(table: pd.DataFrame, suites: Sequence[str]) -> pd.DataFrame:
-    """By suite, then as they were played, lighter masses first."""
+    """Sort by suite, then mass, then order of play."""
     order = table.assign(_rank=table["suite"].map(suites.index))
     return order.sort_values(["_rank", "mass"], kind="stable").drop(columns="_rank").reset_index(drop=True)

@@ -1,4 +1,4 @@
-"""A small fixed evaluation that a training repeats, to tell its better policies from its worse."""
+"""Small fixed evaluation for use during training, to compare policies."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -21,15 +21,15 @@ FIGURES = {
     "transport_robot": "transport",
     "weight_in_hands": "weight_in_hands",
 }
-"""Columns of the long table, and their names here."""
+"""Columns of the long table, and names of their means."""
 BY_LOAD = ("survived", "succeeded", *ERRORS)
-"""Figures of each load, too."""
+"""Metrics that are also averaged per load."""
 
 
 def quick_trials(world: Specification, scene: str, masses: Sequence[float], count: int, seed: int) -> list[Trial]:
-    """`count` trials of a scene's commands at each mass [kg], without a partner and without disturbances.
+    """`count` trials of a scene's commands at each mass [kg], without partner and disturbances.
 
-    `seed`: of the first trial, as the recipe says it, which makes it one of the development split.
+    `seed`: of the first trial, without split offset, so that the trials belong to the development split.
     """
     scripts = [script_for(world.recipe, scene, seed + number) for number in range(count)]
     fixed = UNDISTURBED | {"partner_share": 0.0}
@@ -41,12 +41,12 @@ def quick_trials(world: Specification, scene: str, masses: Sequence[float], coun
 
 
 class QuickEvaluation:
-    """Plays the same trials with one policy after another; `close` it."""
+    """Repeated evaluation of policies on the same trials; must be closed with `close`."""
 
     def __init__(
         self, world: Specification, trials: Sequence[Trial], *, check: Check | None = None, workers: int = 0
     ) -> None:
-        """`check`: see `figures`; `workers`: processes, on which no figure depends; 0 steps the trials in this one."""
+        """`check`: see `figures`; `workers`: number of worker processes, which does not affect results; 0: none."""
         self._check = check or Check()
         self.world, self.trials, self.recipe = world, tuple(trials), world.recipe
         self._robot = load_robot(world.robot)
@@ -55,7 +55,7 @@ class QuickEvaluation:
 
     @property
     def middle(self) -> Trial:
-        """The one in the middle: with as many trials of each load, one of a middling load."""
+        """The trial in the middle of the list, which has a medium load."""
         return self.trials[(len(self.trials) - 1) // 2]
 
     def play(self, policy: Policy) -> dict[str, float]:
@@ -73,17 +73,17 @@ class QuickEvaluation:
         return found
 
     def close(self) -> None:
-        """Ends the environments."""
+        """Close the environments."""
         self._environment.close()
 
 
 def figures(rows: Sequence[Mapping[str, Any]], check: Check) -> dict[str, float]:
-    """Means over trials: survived, succeeded, transport, weight_in_hands, upright (part of the time), four errors up
-    to the end of each trial, and `score`.
+    """Means over trials: survived, succeeded, transport, weight_in_hands, upright (fraction of the time), four errors
+    up to the end of each trial, and `score`.
 
-    The score of a trial, in [0, 1], is the part of the time that it stayed upright times the mean over the four errors
-    of 1 / (1 + error / scale): 1 without any error, 1/2 at its scale (`check.scales`); times `check.fall` where it is
-    not survived.
+    The score of a trial, in [0, 1], is the fraction of the time upright times the mean over the four errors of
+    1 / (1 + error / scale), which is 1 without error and 1/2 at its scale (`check.scales`). A trial that is not
+    survived is also multiplied by `check.fall`.
     """
     names = FIGURES | {name: name for name in (*ERRORS, "upright")}
     columns = {name: np.array([row[name] for row in rows], np.float64) for name in names}

@@ -1,4 +1,4 @@
-"""Plays episodes with a policy, each once, and records the signals of every step."""
+"""Rollouts of given episodes with a policy, with a record of the signals of every step."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
@@ -14,9 +14,9 @@ from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv
 
 RECORDED = tuple(field.name for field in fields(Trace) if field.name != "dt")
-"""Signals that a trace keeps."""
+"""Names of the signals in a trace."""
 ASK_EVERY = 25
-"""Control steps between two questions whether to stop."""
+"""Control steps between checks for an interrupt."""
 
 
 def play_episodes(
@@ -28,7 +28,7 @@ def play_episodes(
     interrupted: Callable[[], bool] = lambda: False,
     progress: Callable[[float], None] = lambda seconds: None,
 ) -> list[Outcome]:
-    """Play each episode to its end and return how they went, in their order; independent of `workers`.
+    """Play each episode to its end; returns the outcomes in order, independent of `workers`.
 
     progress: receives the time reached within the episodes [s]. Raises Interrupted once `interrupted()` is true.
     """
@@ -46,9 +46,9 @@ def play_in(
     progress: Callable[[float], None] = lambda seconds: None,
     look: Callable[[float], None] = lambda seconds: None,
 ) -> list[Outcome]:
-    """Play the episodes of an environment that was made for them; see `play_episodes`.
+    """Play the episodes of an existing environment; see `play_episodes`.
 
-    look: called with the time [s] after the reset and after each step, while the first episode lasts.
+    look: called with the time [s] after the reset and after each step until the first episode ends.
     """
     count, dt = environment.num_envs, environment.period
     layout = environment.layout
@@ -94,6 +94,6 @@ def play_in(
 
 
 def trace_of(recorded: Mapping[str, Array], index: int, steps: int, dt: float) -> Trace:
-    """The first `steps` of one environment as a trace, from signals of shape (T, n, k) by name."""
+    """Trace of the first `steps` of one environment, from signals of shape (T, n, k) by name."""
     rows = {name: values[:steps, index] for name, values in recorded.items()}
     return Trace(dt=dt, **{name: row if row.shape[1] > 1 else row[:, 0] for name, row in rows.items()})

@@ -1,4 +1,4 @@
-"""Command scripts drawn from a seed: what a trial asks for is known to nobody before."""
+"""Random command scripts from a seed."""
 
 from collections.abc import Iterator
 
@@ -13,17 +13,17 @@ from iowbc.recipe.task.commands import Commands
 from iowbc.task.commands.script import CommandScript, CommandSegment
 
 WORDS = 256
-"""Random numbers of a script; more than any uses."""
+"""Random numbers per script; more than any script uses."""
 WHOLE = 0.02
 """Durations are whole multiples of this [s]; a control period at 50 Hz."""
 LONGER = 2.0
-"""Walks and pushes straight on are held for so many times as long as the rest."""
+"""Factor of the hold time of straight walking or pushing."""
 
 
 def drawn_script(
     scripts: DrawnScripts, commands: Commands, *, pushing: bool, seed: int, part: int = 0
 ) -> CommandScript:
-    """The script of a seed. `pushing`: behind a crate; `part`: the how manieth of a trial that plays several."""
+    """The script of a seed. `pushing`: behind a crate; `part`: index of the script in a trial with several."""
     key = random.absorb(random.environment_key(seed, np.zeros(1)), part)
     numbers = iter(random.uniform(key, "script", WORDS)[0].tolist())
     motions = _Motions(scripts, commands, pushing, numbers)
@@ -44,14 +44,14 @@ def drawn_script(
 
 
 class _Motions:
-    """The kinds of motion, each a command (11,) with drawn sizes."""
+    """Generator of motions, each a command (11,) with random sizes."""
 
     def __init__(self, scripts: DrawnScripts, commands: Commands, pushing: bool, numbers: Iterator[float]) -> None:
         self.scripts, self.commands, self.numbers = scripts, commands, numbers
         self.ranges = commands.pushing if pushing else commands
 
     def in_the_open(self) -> list[Array]:
-        """With an object in the hands, or none."""
+        """Motions with or without an object in the hands."""
         scripts = self.scripts
         raised = self.straight()
         raised[[7, 10]] = min(self._between(scripts.raised), self.commands.common_offset[2])
@@ -62,7 +62,7 @@ class _Motions:
         return [raised, *turns, back, side, crouch, self._bow(), self._posture(self._stand())]
 
     def behind_a_crate(self) -> list[Array]:
-        """The hands do not hold it: neither back nor sideways."""
+        """Motions behind a crate; neither backward nor sideways, since the hands do not hold it."""
         scripts = self.scripts
         turns = [
             self._walk(self._between(scripts.walking), 0.0, sign * self._between(scripts.crate_turning))
@@ -74,11 +74,11 @@ class _Motions:
         return [*turns, low, self.straight(), bowed, self._posture(self._stand())]
 
     def straight(self) -> Array:
-        """Straight on."""
+        """Straight forward walk."""
         return self._walk(self._between(self.scripts.walking), 0.0, 0.0)
 
     def _stepping(self) -> float:
-        """Forward speed of a turn, on the spot in every other one [m/s]."""
+        """Forward speed of a turn [m/s]; zero with probability 1/2."""
         speed = self._between(self.scripts.walking)
         return speed if next(self.numbers) < 0.5 else 0.0
 
@@ -92,14 +92,14 @@ class _Motions:
         return command
 
     def _posture(self, command: Array) -> Array:
-        """The command, in a share of the cases in a posture of its own."""
+        """The command, with a random posture with probability `posture_share`."""
         height, pitch = self._between(self.scripts.height), self._between(self.scripts.pitch)
         if next(self.numbers) < self.scripts.posture_share:
             command[3:5] = height, pitch
         return self._clipped(command)
 
     def _bow(self) -> Array:
-        """A bow; a deep one goes from the end of the ordinary range on to that of the deep ones."""
+        """A bow. Deep bows have a pitch between the upper ends of `commands.pitch` and `commands.deep_pitch`."""
         scripts, commands = self.scripts, self.commands
         pitch = min(self._between(scripts.bow), commands.pitch[1])
         deep = self._between((commands.pitch[1], max(commands.deep_pitch[1], commands.pitch[1])))

@@ -1,4 +1,4 @@
-"""The long table of `trials.parquet`: one row a trial, from which it can be played again."""
+"""The long table of `trials.parquet`: one row per trial, from which the trial can be replayed."""
 
 import json
 from typing import Any
@@ -20,7 +20,7 @@ COMPLIANCE, STAGNATION = "compliance", "stagnation"
 
 
 def trial_row(recipe: Recipe, robot: Robot, trial: Trial, outcome: Outcome) -> dict[str, Any]:
-    """One row of the long table: what was tried, how it ended, the metrics, everything drawn, and how to replay it."""
+    """One row of the long table: trial, outcome, metrics, random draws, and the episode for a replay."""
     episode, fixed = trial.episode, trial.episode.fixed
     metrics = trial_metrics(recipe, robot, episode, outcome) | {"seconds": outcome.seconds}
     alive = survived(recipe.eval.success, outcome)
@@ -55,17 +55,16 @@ def trial_row(recipe: Recipe, robot: Robot, trial: Trial, outcome: Outcome) -> d
 
 
 def survived(success: Success, outcome: Outcome) -> bool:
-    """True for a trial that counts as survived; by recipe only where no hand ever let go."""
+    """True if a trial counts as survived; with `slip_fails`, only if no hand ever slipped."""
     slipped = success.slip_fails and bool(np.any(outcome.trace.slipped > 0))
     return outcome.survived and not slipped
 
 
 def succeeded(success: Success, kind: str, metrics: dict[str, float], *, blocked: bool = False) -> bool:
-    """True for a survived trial that is a success: transport of what the hands carry or do not lose, with bounded
-    force in trials of compliance; where a push is infeasible posture and a push that goes on, in the one kind with at
-    least a force and on feet that stay, in the other with at most one.
+    """True if a survived trial is a success, see `carried_along`; in compliance trials also with bounded handle force.
 
-    blocked: whether what is pushed cannot be moved.
+    Infeasible pushes are judged by posture and pushing instead: in stagnation by the time of pushing with bounded foot
+    slip, before a blocked crate (`blocked`) by a minimum push force with bounded hand force.
     """
     posture = metrics["E_alpha"] <= success.posture_pitch and metrics["E_h"] <= success.posture_height
     if kind == STAGNATION:
@@ -81,9 +80,9 @@ def succeeded(success: Success, kind: str, metrics: dict[str, float], *, blocked
 
 
 def carried_along(asked: Success | Acceptance, metrics: dict[str, float], transport: float | None = None) -> bool:
-    """True where robot and object cover enough of the way, with enough of the weight in the hands, and stay together.
+    """True if robot and object cover enough of the path, with enough weight in the hands, and stay together.
 
-    transport: part of the way that is enough, by default that of `asked`.
+    transport: sufficient fraction of the path, default that of `asked`.
     """
     least = asked.transport if transport is None else transport
     shares = (
@@ -96,12 +95,12 @@ def carried_along(asked: Success | Acceptance, metrics: dict[str, float], transp
 
 
 def replayed(row: "pd.Series[Any]") -> Episode:
-    """The episode of a row of the long table, to be played again."""
+    """The episode of a row of the long table, for a replay."""
     return Episode.from_json(json.loads(row["episode"]))
 
 
 def _blocked(outcome: Outcome) -> bool:
-    """True where a crate resists with more than the greatest force that the feet could push with."""
+    """True if a crate's resistance exceeds the friction limit of the feet."""
     drawn, trace = outcome.drawn, outcome.trace
     hold = float(drawn["ground_friction"][0]) * float(trace.foot_load.sum(axis=1).mean())
     return float(drawn["rolling_resistance"][0]) > hold

@@ -1,4 +1,4 @@
-"""Parts of the commanded way that robot and object cover, and their distance to the side."""
+"""Fractions of the commanded path that robot and object cover, and their lateral distance."""
 
 import numpy as np
 
@@ -6,11 +6,11 @@ from iowbc.arrays import Array, Mask
 from iowbc.control.command import YAW_RATE
 
 SHORTEST_WAY = 0.1
-"""Least commanded way with a transport [m]."""
+"""Minimum commanded distance for a transport metric [m]."""
 
 
 def commanded_path(given: Array, heading: float, dt: float) -> tuple[Array, float]:
-    """Directions of the commanded motion in the world, (T, 2), zero while it stands, and its length [m].
+    """Directions of the commanded motion in the world frame, (T, 2), zero in standing, and path length [m].
 
     given: commands (T, 11); heading: of the robot at the start [rad].
     """
@@ -25,10 +25,10 @@ def commanded_path(given: Array, heading: float, dt: float) -> tuple[Array, floa
 
 
 def covered(position: Array, directions: Array, length: float) -> float:
-    """The part of a commanded way that a body covers; NaN where none is commanded.
+    """Fraction of a commanded path that a body covers; NaN for a path shorter than `SHORTEST_WAY`.
 
-    position: (T, 2 or more) [m]; directions: (T or more, 2) and length [m] of `commanded_path`. What is covered is the
-    body's motion along the direction commanded at the time: swaying cancels, running away sideways counts nothing.
+    position: (T, 2 or more) [m]; directions: (T or more, 2) and length [m] of `commanded_path`. Covered distance is the
+    body's motion along the direction commanded at the time; swaying cancels and sideways motion does not count.
     """
     if length < SHORTEST_WAY:
         return np.nan
@@ -37,7 +37,7 @@ def covered(position: Array, directions: Array, length: float) -> float:
 
 
 def beside(robot: Array, heading: Array, body: Array, moving: Mask) -> float:
-    """The largest distance of a body to the side of the robot while steps are asked for [m]; NaN where none are.
+    """Largest lateral distance of a body from the robot while stepping is commanded [m]; NaN if it never is.
 
     robot, body: (T, 2 or more) [m]; heading: (T,) [rad]; moving: (T,).
     """
