@@ -1,5 +1,5 @@
-"""Files beside a recipe. Reading it takes them in, so that artifacts, worker processes and exported folders have all
-that they were made from, and a key changes with their content."""
+"""Files beside a recipe. Reading the recipe embeds their content, so that artifacts, worker processes and exported
+folders are self-contained, and a cache key changes with the content."""
 
 import base64
 import binascii
@@ -17,23 +17,24 @@ from iowbc.recipe.section import COSMETIC, Section
 
 
 class FileBeside(Section):
-    """A file, named in a recipe by its path from there, and its content."""
+    """A file that a recipe names by a path relative to itself, with the file's embedded content."""
 
     suffixes: ClassVar[tuple[str, ...]] = ()
-    """Endings that its name may have."""
+    """Permitted file extensions."""
     largest: ClassVar[int] = 0
-    """Bytes of the largest that is taken in."""
+    """Largest file size [bytes]."""
 
     path: str = Field(json_schema_extra=COSMETIC)
-    """Its place, as the recipe says it."""
+    """Path of the file, as written in the recipe."""
     sha256: str
-    """Digest of its bytes."""
+    """SHA-256 digest of the file's bytes."""
     content: str = Field(json_schema_extra=COSMETIC)
-    """Its bytes, compressed by zlib, in base64."""
+    """The file's bytes, compressed by zlib, in base64."""
 
     @classmethod
     def taken_in(cls, file: Path, path: str) -> Self:
-        """The file as it is now; `path`: as the recipe says it. Raises ValueError for one that cannot be taken in."""
+        """Embed the current content of `file`; `path` is the path written in the recipe. Raises ValueError for a file
+        with another extension, or one that is unreadable, too large or empty."""
         if file.suffix.lower() not in cls.suffixes:
             raise ValueError(f"should be a file that ends in {' or '.join(cls.suffixes)}")
         try:
@@ -46,7 +47,7 @@ class FileBeside(Section):
         return cls(path=path, sha256=hashlib.sha256(data).hexdigest(), content=packed)
 
     def unpacked(self) -> bytes:
-        """Its bytes. Raises ValueError where they are not those of the digest."""
+        """The file's bytes. Raises ValueError if the content is damaged or does not match the digest."""
         unpacking = zlib.decompressobj()
         try:
             data = unpacking.decompress(base64.b64decode(self.content, validate=True), self.largest + 1)
@@ -65,7 +66,7 @@ class FileBeside(Section):
 
     @classmethod
     def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        """In a recipe that people write it is a path; in a resolved one it has been taken in."""
+        """Accept a path (as in a recipe file) or the embedded file (as in a resolved recipe)."""
         taken: dict[str, Any] = handler.resolve_ref_schema(super().__get_pydantic_json_schema__(core, handler))
         return {"anyOf": [{"type": "string", "description": "Path from the recipe's file."}, taken]}
 
@@ -78,16 +79,16 @@ class ModuleFile(FileBeside):
 
 
 class MeshFile(FileBeside):
-    """Triangles of an object. A few thousand describe any: what touches is their convex hull."""
+    """Triangle mesh of an object. A few thousand triangles suffice, because collisions use their convex hull."""
 
     suffixes: ClassVar[tuple[str, ...]] = (".obj", ".stl")
     largest: ClassVar[int] = 400_000
 
 
 class OwnFunction(Section):
-    """A function in a file of one's own."""
+    """A function in a user's Python file."""
 
     module: ModuleFile
-    """Python file beside the recipe, which may import what is installed, and no file beside it."""
+    """Python file beside the recipe. It may import installed packages, but not other files beside the recipe."""
     function: str = Field(pattern="^[A-Za-z_][A-Za-z0-9_]*$", max_length=100)
-    """Its function."""
+    """Name of the function in that file."""

@@ -11,7 +11,7 @@ Share = Annotated[float, Field(ge=0, le=1)]
 
 
 class WristRegion(Section):
-    """Places of the wrists: a box for the left wrist; the right one is mirrored and moved by the asymmetry."""
+    """Region of wrist positions: a box for the left wrist; the right one is mirrored and shifted by the asymmetry."""
 
     x: Interval = Interval(low=0.14, high=0.46)
     """Forward of the frame's origin [m]."""
@@ -26,28 +26,28 @@ class WristRegion(Section):
 
 
 class Sampling(Section):
-    """Arm postures and base commands that are labelled: a scrambled Sobol sequence with edges and nominal points."""
+    """Sampling of arm postures and base commands to label: a scrambled Sobol sequence with edge and nominal points."""
 
     samples: int = Field(default=60000, ge=16, le=2_000_000)
-    """Points tried; about six in ten get a label (three have arms in collision, one is out of the robot's reach)."""
+    """Number of candidates; about six in ten get a label (three have arms in collision, one is out of reach)."""
     height: Interval = Interval(low=0.5, high=0.8)
     """Commanded height [m]."""
     pitch: Interval = Interval(low=-0.5, high=1.5)
     """Commanded torso pitch [rad], positive leaning forward."""
     heading_share: Share = 0.5
-    """Share of the arms put by inverse kinematics at wrist positions in the heading frame, as wrist commands do."""
+    """Fraction of the arm postures from inverse kinematics of wrists in the heading frame, like wrist commands."""
     torso_share: Share = 0.35
-    """Share put at wrist positions in the torso frame, as when a load leans with the trunk; the rest is uniform."""
+    """Fraction from wrist positions in the torso frame, as when a load leans with the trunk; the rest is uniform."""
     wrists: WristRegion = WristRegion()
-    """Places of those wrists."""
+    """Region of those wrist positions."""
     joint_ranges: dict[str, Interval] = Field(default={})
-    """Narrower ranges [rad] of arm joints in the uniform share, e.g. `left_elbow_joint: {low: 0, high: 1}`."""
+    """Narrower ranges [rad] of arm joints for the uniform postures, e.g. `left_elbow_joint: {low: 0, high: 1}`."""
     boundary_share: Share = 0.06
-    """Share of the samples moved onto the edge of the command ranges, so that nothing is extrapolated there."""
+    """Fraction of the samples moved onto the edge of the command ranges, to avoid extrapolation there."""
     nominal_share: Share = 0.03
-    """Share of the samples with the arms at the default posture."""
+    """Fraction of the samples with the arms at the default posture."""
     mirrored_share: Share = 0.05
-    """Share of the samples that repeat another one mirrored left to right: they measure the labels' symmetry."""
+    """Fraction of the samples that mirror another one left to right, to measure the labels' symmetry."""
 
     def problems(self) -> Iterator[tuple[str, str]]:
         if self.heading_share + self.torso_share > 1.0:
@@ -55,7 +55,7 @@ class Sampling(Section):
 
 
 class PostureProblem(Section):
-    """The cost (paper eq. 4) and the physical limits, the same for both methods. Costs are ½·weight·residual²."""
+    """Cost (paper eq. 4) and physical limits of both methods. Costs are ½·weight·residual²."""
 
     com_weight: Positive = 1e3
     """Horizontal distance of the centre of mass from the middle of the soles [1/m²]."""
@@ -72,25 +72,25 @@ class PostureProblem(Section):
     waist_weight: Positive = 5.0
     """Waist joints [1/rad²]. Without it hips and waist share the pitch arbitrarily, and the optimum jumps."""
     waist_share: Share = Field(default=0.0, json_schema_extra=LATER)
-    """Part of the commanded torso pitch that the waist is drawn to, as far as it turns; hips take the rest. At 1 the
-    pelvis stays level up to a bow of 0.5 rad, as the gait has it, and a load that the waist's motors cannot hold
-    there sinks no further than the joint's stop."""
+    """Fraction of the commanded torso pitch that is the waist's target, within its range; hips take the rest. At 1 the
+    pelvis stays level up to a bow of 0.5 rad, as in the gait, and the joint's stop bears loads that exceed the waist's
+    motors."""
     friction: Positive = 0.6
-    """Friction coefficient of the soles that a label may use; the simulation draws 0.5 to 1.2."""
+    """Friction coefficient of the soles for labels; the simulation draws 0.5 to 1.2."""
     sole_fraction: Annotated[float, Field(gt=0, le=1)] = 0.9
-    """Part of the sole's rectangle within which the centre of pressure stays."""
+    """Fraction of the sole's rectangle within which the centre of pressure stays."""
     smallest_load: NonNegative = 20.0
-    """Least normal force on each foot [N]."""
+    """Smallest normal force on each foot [N]."""
     limit_margin: NonNegative = 0.02
     """Distance kept from joint limits [rad]."""
     effort_fraction: Annotated[float, Field(gt=0, le=1)] = 0.95
-    """Part of the torque limits that a label may use."""
+    """Fraction of the torque limits that a label may use."""
     stance_width: Positive = 0.237
     """Distance between the sole centres [m]: hip to hip, so that the default posture has straight hips."""
     iterations: int = Field(default=40, ge=1, le=10_000)
-    """Most Gauss-Newton steps of the static method."""
+    """Largest number of Gauss-Newton steps of the static method."""
     tolerance: Positive = 1e-4
-    """The static method ends when no joint moves by more than this in a step [rad]."""
+    """Convergence tolerance of the static method: largest joint motion of a step [rad]."""
     largest_step: Positive = 0.5
     """Largest move of a joint in a Gauss-Newton step [rad]."""
 
@@ -103,15 +103,16 @@ class OptimalControl(Section):
     step: Positive = 0.05
     """Length of an interval [s]."""
     iterations: int = Field(default=60, ge=1, le=10_000)
-    """Most solver iterations."""
+    """Largest number of solver iterations."""
     label_at: Annotated[float, Field(gt=0, lt=1)] = 0.7
     """Fraction of the horizon whose node is the label: the terminal node is biased by the terminal cost."""
     velocity_weight: Positive = 0.03
-    """Joint and base velocities [s²/rad²]. Postures that cost nearly as little as the optimum are left with a time
-    constant of 0.2 s at 0.03, 0.3 s at 0.1."""
+    """Joint and base velocities [s²/rad²]. Along flat directions of the cost, postures converge with a time
+    constant of 0.2 s at 0.03, and 0.3 s at 0.1."""
     terminal_factor: Positive = 0.05
-    """Terminal weights over running weights, which count for each second: 0.05 is one more interval. At 10 the missing
-    torques at the end bend the flattest postures by 0.25 rad, and by 0.1 at the label's node."""
+    """Ratio of terminal to running weights; the latter are per second, so that 0.05 equals one more interval. At 10,
+    the absence of torques at the end bends the postures of flattest cost by 0.25 rad, and by 0.1 at the label's
+    node."""
     terminal_velocity_weight: Positive = 1e2
     """Velocities at the end of the horizon [s²/rad²]."""
     limit_weight: Positive = 1e3
@@ -125,7 +126,7 @@ class OptimalControl(Section):
 
 
 class LabelGates(Section):
-    """Gates of a label, whatever its method; a sample that misses one is rejected with that reason."""
+    """Acceptance limits of a label by either method; a sample beyond a limit is rejected with that reason."""
 
     foot_position: Positive = 0.002
     """Distance of each sole centre from its place [m]."""
@@ -136,22 +137,22 @@ class LabelGates(Section):
     orientation: Positive = 0.03
     """Error of the commanded torso orientation [rad]."""
     equilibrium: Positive = 0.5
-    """Force [N] or moment [N·m] left over on the base."""
+    """Residual force [N] or moment [N·m] on the base."""
     wrench: NonNegative = 0.5
     """Violation of friction or centre-of-pressure limits [N]."""
     support_margin: float = 0.02
-    """Least distance of the projected centre of mass inside the support polygon [m]."""
+    """Smallest distance of the projected centre of mass inside the support polygon [m]."""
     collision_clearance: float = 0.0
-    """Least distance between the capsules of links that may touch [m]."""
+    """Smallest distance between the capsules of links that may touch [m]."""
 
 
 class CrossCheck(Section):
-    """Static labels held against the optimal control problem."""
+    """Comparison of static labels with the optimal control problem."""
 
     samples: int = Field(default=300, ge=0, le=2_000_000)
-    """Labels that are solved again by optimal control; 0 leaves the check out. Without effect for `method: ocp`."""
+    """Labels solved again by optimal control; 0: no check. Without effect for `method: ocp`."""
     p90_limit: Positive = 0.02
-    """The stage fails when one sample in ten differs by more in some joint [rad]."""
+    """Limit on the 90th percentile of the largest joint difference of a sample [rad]; beyond it, the stage fails."""
 
 
 class FeasibleRegion(Section):
@@ -162,24 +163,24 @@ class FeasibleRegion(Section):
     pitches: int = Field(default=41, ge=3, le=1000)
     """Grid points over the pitch range."""
     jump: Positive = 0.055
-    """Largest move of a joint for one step of height or pitch (`fit.smoothness`) that the network makes in the map
-    [rad]: near straight legs and at joint limits the reference leaps."""
+    """Largest joint motion of the network per step of height or pitch (`fit.smoothness`) in the map [rad]. It excludes
+    commands near straight legs and joint limits, where the reference jumps."""
     gentle_share: Share = 0.98
-    """Share of the arm postures for which that must hold at a command."""
+    """Fraction of the arm postures for which `jump` must hold at a command."""
     arms: int = Field(default=200, ge=1, le=100_000)
-    """Arm postures of the dataset on which that is judged."""
+    """Number of arm postures of the dataset on which `jump` is tested."""
     bound_slope: Positive = 1.0
-    """Steepest change of the map's bounds with pitch [m/rad]: a clamped height does not leap when the pitch moves."""
+    """Largest slope of the map's bounds over pitch [m/rad], so that a clamped height does not jump as pitch changes."""
     kept_share: Share = 0.5
-    """A command needs this share of the samples around it, with any arms, to have a label."""
+    """Smallest fraction of the samples around a feasible command, with any arm posture, that have a label."""
     window: tuple[Positive, Positive] = (0.02, 0.1)
-    """Samples around a command: those within this height [m] and pitch [rad]."""
+    """Half-widths in height [m] and pitch [rad] of the samples around a command."""
     enough: int = Field(default=20, ge=1, le=100_000)
-    """Samples that there must be for their share to count; fewer leave it to the two arm postures of the grid."""
+    """Smallest number of samples for `kept_share` to apply; with fewer, the two arm postures of the grid decide."""
 
 
 class FitGates(Section):
-    """Gates of the network on held-out samples. `null` leaves a gate out."""
+    """Acceptance limits of the network on held-out samples. `null` disables a limit."""
 
     joint_rmse: Positive | None = 0.016
     """Root mean square error of the joints [rad]."""
@@ -192,7 +193,7 @@ class FitGates(Section):
     margin_p1: float | None = 0.04
     """1st percentile of the distance of the centre of mass inside the support polygon [m]."""
     jump: Positive | None = 0.05
-    """Largest move of a joint for one small step of the command [rad]."""
+    """Largest joint motion for one small step of the command [rad]."""
 
 
 class SmoothnessCheck(Section):
@@ -212,21 +213,21 @@ class Fit(Section):
     hidden: tuple[Width, ...] = Field(default=(128, 64), min_length=1, max_length=DEEPEST)
     """Widths of the hidden layers (paper's order of size), ELU."""
     held_out: Annotated[float, Field(gt=0, lt=1)] = 0.1
-    """Share of the samples kept for the gates; a sample and its mirror image are on the same side."""
+    """Fraction of the samples held out for the gates; a sample and its mirror image are on the same side."""
     validation: Annotated[float, Field(gt=0, lt=1)] = 0.05
-    """Share kept for early stopping, apart from the gates'."""
+    """Fraction held out for early stopping, distinct from that for the gates."""
     mirror: bool = True
     """Train on the left-right mirror image of each sample as well."""
     epochs: int = Field(default=150, ge=1, le=1_000_000)
-    """Most passes over the training samples."""
+    """Largest number of passes over the training samples."""
     batch: int = Field(default=256, ge=1, le=2_000_000)
-    """Samples in a gradient step."""
+    """Batch size."""
     learning_rate: Positive = 5e-3
-    """Adam's first learning rate; it falls to a hundredth along a cosine."""
+    """Initial learning rate of Adam; a cosine schedule reduces it to a hundredth."""
     patience: int = Field(default=40, ge=1, le=1_000_000)
     """Epochs without a better validation loss before training ends."""
     task_weight: NonNegative = 4.0
-    """Weight of the errors in feet, height and torso orientation beside the joints, in the units of `length_scale`."""
+    """Weight of the errors in feet, height and torso orientation relative to the joints, in units of `length_scale`."""
     length_scale: Positive = 0.1
     """Length [m] that weighs as much as one radian in that loss."""
     gates: FitGates = FitGates()
@@ -241,18 +242,17 @@ class ReferenceGenerator(Section):
     method: Literal["static", "ocp"] = "static"
     """Method of labelling: `ocp` is the optimal control problem, `static` its steady state (15 times faster)."""
     height: Literal["pelvis", "com"] = "pelvis"
-    """Meaning of the commanded height: the pelvis (0.5 to 0.8 m on the G1), or the centre of mass as the paper
-    writes."""
+    """Meaning of the commanded height: the pelvis (0.5 to 0.8 m on the G1), or the centre of mass (paper)."""
     sampling: Sampling = Sampling()
-    """Arms and commands that are labelled."""
+    """Arm postures and commands to label."""
     problem: PostureProblem = PostureProblem()
     """Costs and physical limits."""
     ocp: OptimalControl = OptimalControl()
     """The optimal control problem over a horizon."""
     gates: LabelGates = LabelGates()
-    """Gates of each label."""
+    """Acceptance limits of each label."""
     crosscheck: CrossCheck = CrossCheck()
-    """Static labels against optimal control."""
+    """Comparison of static labels with optimal control."""
     feasible: FeasibleRegion = FeasibleRegion()
     """The feasible map."""
     fit: Fit = Fit()

@@ -23,7 +23,7 @@ class PPO(Section):
     entropy: float = Field(default=0.0, ge=0)
     """Weight of the entropy bonus."""
     gradient_norm: float = Field(default=1.0, gt=0)
-    """Largest norm of a gradient step."""
+    """Largest gradient norm; larger gradients are clipped."""
     std_floor: float = Field(default=0.05, gt=0)
-    """Least standard deviation. At a floor below half of `std_end` a teacher has stopped exploring and returns to its
-    best policy; a higher floor may be reached."""
+    """Smallest standard deviation of the action. A teacher that reaches a floor below half of `std_end` has stopped
+    exploring and returns to its best policy; a higher floor may be reached."""

@@ -24,9 +24,9 @@ CONTROLLER: tuple[StageName, ...] = PIPELINE[:6]
 """Stages of the controller, without those of the skill layer above it."""
 
 SEEDS = ("seed", "teacher.seed", "distill.seed", "skill.learning.seed")
-"""Dotted paths that tell repetitions of one experiment apart."""
+"""Dotted paths of the seeds, which distinguish repetitions of an experiment."""
 NAME = "[a-z0-9][a-z0-9_-]*"
-"""Pattern of the name of an experiment; it names files."""
+"""Pattern of an experiment's name, which is also used in file names."""
 
 
 class Recipe(Section):
@@ -37,16 +37,15 @@ class Recipe(Section):
     description: str = ""
     """Purpose of the experiment, in a sentence."""
     seed: int = Field(default=0, ge=0, lt=2**32)
-    """Seed of everything that is drawn at random."""
+    """Seed of all random numbers."""
     robot: str = "g1"
     """Folder under `robots/` that describes the robot."""
     stages: tuple[StageName, ...] = Field(default=CONTROLLER, min_length=1)
-    """Stages of this experiment; they run in the order of the pipeline. `skill` and `skill-eval` are only run where
-    they are named."""
+    """Stages of this experiment; they run in the order of the pipeline. `skill` and `skill-eval` run only if listed."""
     rg: ReferenceGenerator = ReferenceGenerator()
     """The reference generator: its dataset and its network."""
     simulation: SimulationSettings = SimulationSettings()
-    """The world: physics, scenes, partner, randomisation, sensing."""
+    """Simulation settings: physics, scenes, partner, randomization, sensing."""
     task: Task = Task()
     """The Markov decision process: commands, observation, action, reward, terminations, curriculum."""
     teacher: Teacher = Teacher()
@@ -64,7 +63,7 @@ class Recipe(Section):
 
     @property
     def deployed(self) -> Self:
-        """The same for a policy that does not see s_priv: without the parts of it that are in a user's file."""
+        """The recipe for a policy that does not observe s_priv: without custom parts of s_priv."""
         observation = self.task.observation.model_copy(update={"own": {}})
         return self.model_copy(update={"task": self.task.model_copy(update={"observation": observation})})
 
@@ -91,9 +90,9 @@ class Recipe(Section):
 
 
 def recipe_schema() -> dict[str, Any]:
-    """JSON Schema of a recipe file: the recipe's fields with their sentences, and `extends`.
+    """JSON Schema of a recipe file: the recipe's fields with their attribute docstrings, and `extends`.
 
-    No key is required, for a section may hold any part of its keys; `iowbc plan` names what an entry of a list lacks.
+    No key is required, because sections may be partial; `iowbc plan` reports missing keys of list entries.
     """
     schema = Recipe.model_json_schema()
     for definition in (schema, *schema["$defs"].values()):

@@ -1,4 +1,4 @@
-"""Names of scenes in a recipe: each exists, and a recipe's own scenes have all that they need."""
+"""Validation of scene names in a recipe, and of the entries that custom scenes require."""
 
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def misnamed(recipe: "Recipe") -> Iterator[tuple[str, str]]:
-    """Dotted paths, and the problem there."""
+    """Invalid scene names and incomplete custom scenes: pairs of a dotted path and a message."""
     simulation, task, evaluation = recipe.simulation, recipe.task, recipe.eval
     worlds = {"simulation.scenes": simulation.scenes}
     if evaluation.simulation is not None:
@@ -39,7 +39,7 @@ def misnamed(recipe: "Recipe") -> Iterator[tuple[str, str]]:
 
 
 def with_scenes(scenes: Scenes, further: Mapping[str, TrialScene]) -> Scenes:
-    """Scenes with those of the trials, which may replace some."""
+    """Scenes merged with those of the trials, which may replace some."""
     return Scenes.model_validate({**dict(scenes), **{name: own.scene for name, own in further.items()}})
 
 
@@ -51,7 +51,7 @@ def _unknown(path: str, names: tuple[str, ...], known: tuple[str, ...]) -> Itera
 
 
 def _incomplete(path: str, name: str, scenes: Scenes, task: Task) -> Iterator[tuple[str, str]]:
-    """Entries that a scene of a recipe's own lacks."""
+    """Missing entries of a custom scene."""
     scene, references = getattr(scenes, name), task.references
     if name not in references.grasps.names:
         near = references.grasps.push if scene.kind == "push" else references.grasps.lift

@@ -1,4 +1,4 @@
-"""The base of every recipe section, and which of its values decide results."""
+"""Base class of the recipe sections, and the choice of the values that enter cache keys."""
 
 import ast
 import functools
@@ -23,14 +23,14 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
 COSMETIC: dict[str, Any] = {"cosmetic": True}
-"""Extra of a field that changes how a stage is carried out or shown, and none of its results."""
+"""Marks a field that changes how a stage is run or shown, but none of its results; it is not part of the key."""
 LATER: dict[str, Any] = {"later": True}
-"""Extra of a field that came after artifacts were published. At its default, which is what the program did before, it
-decides nothing, so that their keys hold."""
+"""Marks a field that was added after artifacts were published. Its default is the earlier behaviour and is not part of
+the key, so that the keys of those artifacts stay valid."""
 
 
 def in_order(ends: tuple[float, float]) -> tuple[float, float]:
-    """The lower and upper end of a range. Raises ValueError where they are the other way round."""
+    """The lower and upper end of a range. Raises ValueError if the lower end is above the upper end."""
     if ends[0] > ends[1]:
         raise ValueError(f"the lower end {ends[0]:g} is above the upper end {ends[1]:g}")
     return ends
@@ -53,28 +53,28 @@ NonNegative = Annotated[float, Field(ge=0)]
 Width = Annotated[int, Field(gt=0, le=16_384)]
 """Units of a hidden layer."""
 ArtifactName = Annotated[str, Field(pattern=r"^([0-9a-f]{8,64}|.+\.ya?ml)$", max_length=300)]
-"""An artifact of another recipe: that recipe's file, or eight or more first characters of the artifact's key."""
+"""Artifact of another recipe: that recipe's file, or the first characters (8 or more) of the artifact's key."""
 RecipeFile = Annotated[str, Field(pattern=r".+\.ya?ml$", max_length=300)]
 """The file of another recipe."""
 DEEPEST = 16
-"""Hidden layers of the deepest network."""
+"""Largest number of hidden layers of a network."""
 OWN_NAME = "[a-z][a-z0-9_]{0,31}"
-"""Pattern of a name that a recipe gives to a scene or a term of its own."""
+"""Pattern of the name of a custom scene or reward term."""
 OwnName = Annotated[str, Field(pattern=f"^{OWN_NAME}$")]
 
 
 class Section(BaseModel):
-    """A frozen part of a recipe that refuses keys it does not know."""
+    """Immutable part of a recipe; unknown keys are an error."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     @property
     def idle(self) -> bool:
-        """True where an entry of a mapping does nothing, so that it might as well not be there."""
+        """True if this entry of a mapping has no effect; such an entry is not part of the key."""
         return False
 
     def problems(self) -> Iterator[tuple[str, str]]:
-        """Values that do not fit each other: dotted path from here, empty for the section itself, and what is wrong."""
+        """Inconsistent values: pairs of a dotted path relative to this section (empty: itself) and a message."""
         return iter(())
 
     @model_validator(mode="after")
@@ -85,7 +85,7 @@ class Section(BaseModel):
 
     @classmethod
     def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        """Each field is described by the sentence below it."""
+        """Use the attribute docstrings as descriptions of the fields."""
         schema = handler(core)
         fields = handler.resolve_ref_schema(schema).get("properties", {})
         for name, sentence in sentences(cls).items():
@@ -108,21 +108,21 @@ class Interval(Section):
 
 
 class NamedEntries(Section):
-    """Entries by name: fields for those that every recipe has, and a recipe's own beside them, all of one type.
+    """Mapping of names to entries of one type: built-in entries are fields, and a recipe may add custom ones.
 
-    The type of one's own is the annotation of `__pydantic_extra__`.
+    The type of custom entries is the annotation of `__pydantic_extra__`.
     """
 
     model_config = ConfigDict(extra="allow")
 
     @property
     def names(self) -> tuple[str, ...]:
-        """All names, a recipe's own last."""
+        """All names, custom ones last."""
         return (*type(self).model_fields, *self.own)
 
     @property
     def own(self) -> tuple[str, ...]:
-        """Names that the recipe adds."""
+        """Names of the custom entries."""
         return tuple(self.model_extra or ())
 
     def problems(self) -> Iterator[tuple[str, str]]:
@@ -134,22 +134,23 @@ class NamedEntries(Section):
 
 
 class Encoder(Section):
-    """A network that turns the observation history H_t into a latent."""
+    """Network that encodes the observation history H_t as a latent vector."""
 
     encoder: Literal["mlp"] = "mlp"
-    """Layers over all of the history at once turn it into a latent. Where the teacher is symmetric by construction, so
-    is the student: the encoder has half the latent's size and reads the history and its mirror image."""
+    """Multilayer perceptron over the whole history. If the teacher is symmetric by construction, so is the student:
+    the encoder has half the latent's size and is applied to the history and to its mirror image."""
     frame_features: int = Field(default=32, ge=1, le=16_384)
-    """Features to which one observation of the history is projected, with the same weights for all."""
+    """Features to which each observation of the history is projected, with shared weights."""
     latent: int = Field(default=64, ge=1, le=16_384)
-    """Size of what the encoder makes of the whole history; even, where the mirror swaps its halves."""
+    """Size of the latent vector. It is even if the student is symmetric by construction: mirroring swaps its halves."""
 
 
 @functools.cache
 def sentences(section: type[BaseModel]) -> dict[str, str]:
-    """The string below each field of a section and its bases, by the field's name.
+    """Attribute docstrings of a section and its bases, by field name.
 
-    For those who ask: pydantic's `use_attribute_docstrings` reads every section's source whenever a command starts.
+    They are read on demand: pydantic's `use_attribute_docstrings` reads every section's source whenever a command
+    starts.
     """
     bases = [base for base in section.__bases__ if issubclass(base, BaseModel) and base is not BaseModel]
     (definition,) = ast.parse(textwrap.dedent(inspect.getsource(section))).body
@@ -167,7 +168,7 @@ def sentences(section: type[BaseModel]) -> dict[str, str]:
 
 
 class Unfitting(ValueError):
-    """Values of a section that do not fit each other; see `Section.problems`."""
+    """Inconsistent values of a section; see `Section.problems`."""
 
     def __init__(self, problems: tuple[tuple[str, str], ...]) -> None:
         self.problems = problems
@@ -175,8 +176,8 @@ class Unfitting(ValueError):
 
 
 def deciding(section: Section) -> dict[str, Any]:
-    """The values of a section that decide results, as JSON data, however deep, without its cosmetic fields and without
-    later ones at their default."""
+    """The values of a section that enter its key, as JSON data. At every depth, COSMETIC fields, LATER fields at their
+    default and idle entries are left out."""
     return _deciding(section, section.model_dump(mode="json"))
 
 
@@ -194,7 +195,7 @@ def _deciding(value: Any, plain: Any) -> Any:
 
 
 def _acting(value: Any) -> Any:
-    """A mapping without its idle entries; anything else as it is."""
+    """A mapping without its idle entries; any other value unchanged."""
     if not isinstance(value, Mapping):
         return value
     return {name: item for name, item in value.items() if not (isinstance(item, Section) and item.idle)}

@@ -1,4 +1,4 @@
-"""A sweep: a recipe or a study with every combination of a grid of values and of values drawn at random."""
+"""A sweep: variants of a recipe or a study over a grid of values and random draws."""
 
 import contextlib
 import hashlib
@@ -23,20 +23,20 @@ from iowbc.recipe.recipe import NAME
 from iowbc.recipe.section import Interval, Section
 
 DIGITS = 4
-"""Significant digits of a drawn value: it can be read and typed again, and no result hangs on the fifth."""
+"""Significant digits of a drawn value, so that it is easy to read and type; further digits do not matter."""
 MOST_VALUES = 10_000
-"""Values of one axis at most."""
+"""Largest number of values of an axis."""
 MOST_POINTS = 1_000
-"""Points of a sweep at most, unless more are asked for: planning one takes some 10 ms and 200 kB."""
+"""Default limit on the points of a sweep: planning each takes some 10 ms and 200 kB."""
 
 
 class Drawn(Interval):
     """A number drawn at random: x ~ U(low, high), or log x ~ U(log low, log high)."""
 
     scale: Literal["linear", "log"] = "linear"
-    """`log` draws each order of magnitude alike often: for rates and weights whose size is not known."""
+    """`log`: all orders of magnitude are equally likely, for rates and weights of unknown scale."""
     whole: bool = False
-    """Rounds it to an integer."""
+    """Round to an integer."""
 
     def problems(self) -> Iterator[tuple[str, str]]:
         if self.high <= self.low:
@@ -47,7 +47,7 @@ class Drawn(Interval):
             yield "", f"low {self.low}: a logarithmic scale begins above 0"
 
     def value(self, part: float) -> int | float:
-        """The number for a part of the way from low to high, 0 to 1."""
+        """The number at a fraction of the way from low to high, 0 to 1."""
         low, high = (self.low, self.high) if self.scale == "linear" else (math.log(self.low), math.log(self.high))
         found = low + part * (high - low)
         found = found if self.scale == "linear" else math.exp(found)
@@ -55,14 +55,14 @@ class Drawn(Interval):
 
 
 class RandomDraws(Section):
-    """Points drawn at random, each with all of these values."""
+    """Random points, each with a draw of all values."""
 
     count: int = Field(ge=1, le=MOST_VALUES)
     """Number of draws."""
     seed: int = Field(default=0, ge=0, lt=2**32)
-    """Seed of the draws: more of them leave the first ones as they were, and so do more paths."""
+    """Seed of the draws; increasing `count` or adding paths does not change earlier draws."""
     values: Mapping[str, Drawn] = Field(min_length=1)
-    """Values that are drawn, by dotted path of the recipe."""
+    """Distributions of the drawn values, by dotted path of the recipe."""
 
     def points(self) -> list[dict[str, JsonValue]]:
         """The drawn values of each draw, by dotted path."""
@@ -77,13 +77,13 @@ class SweepFile(Section):
     """The file of a sweep, `iowbc sweep RECIPE --from FILE`: every combination of the grid with every draw."""
 
     name: str | None = Field(default=None, pattern=f"^{NAME}$", max_length=64)
-    """Name of the sweep; the file's name when empty."""
+    """Name of the sweep; empty: the file's name."""
     description: str = ""
     """Purpose of the sweep, in a sentence."""
     grid: Mapping[str, list[JsonValue]] = {}
     """Values by dotted path of the recipe; `0..4` stands for the integers 0 to 4."""
     draws: RandomDraws | None = None
-    """Values that are drawn at random."""
+    """Random draws."""
 
 
 INTEGERS = re.compile(r"(-?[0-9]{1,10})\.\.(-?[0-9]{1,10})")
@@ -93,12 +93,12 @@ LONGEST_NAME = 64
 DIGEST_LENGTH = 6
 """Characters of the digest in the name of a point."""
 RECIPE_AXIS = "recipe"
-"""Further axis of the sweep of a study."""
+"""Additional axis of a study's sweep: the variant."""
 
 
 @dataclass(frozen=True)
 class Point:
-    """One run of a sweep: an ordinary recipe under a name of its own."""
+    """One run of a sweep: an ordinary recipe with its own name."""
 
     loaded: LoadedRecipe
     settings: Mapping[str, JsonValue]
@@ -111,14 +111,14 @@ class Point:
 
 @dataclass(frozen=True)
 class Sweep:
-    """Recipes that differ in what a sweep varies."""
+    """A sweep's points, which differ in the varied values."""
 
     name: str
     points: tuple[Point, ...]
 
     @property
     def axes(self) -> tuple[str, ...]:
-        """Dotted paths that are varied, the same for all points."""
+        """Dotted paths of the varied values, the same for all points."""
         return tuple(self.points[0].settings)
 
 
@@ -131,8 +131,8 @@ def load_sweep(
 ) -> Sweep:
     """The points of a sweep, all of them valid recipes. Raises `RecipeError`.
 
-    settings: `path=value` holds for all points; `path=a,b` and `path=0..4` vary it, and go before what the file says.
-    most: points at most. counted: receives their number before any is read.
+    settings: `path=value` holds for all points; `path=a,b` and `path=0..4` vary it, and override the file.
+    most: largest number of points. counted: called with their number before any is read.
     """
     described = SweepFile() if file is None else _read_file(file)
     grid = {path: _expanded(values, f"{file}") for path, values in described.grid.items()}
@@ -167,7 +167,7 @@ def load_sweep(
 
 
 def _points(word: str, fixed: Sequence[str], settings: Mapping[str, JsonValue]) -> list[Point]:
-    """The point of a recipe, or those of the variants that a study names."""
+    """The point of a recipe, or the points of a study's variants."""
     overrides = (*fixed, *(f"{path}={written(value)}" for path, value in settings.items()))
     if variants := load_study(word, overrides):
         return [Point(_named(one, settings), {RECIPE_AXIS: one.recipe.name, **settings}) for one in variants]
@@ -175,7 +175,7 @@ def _points(word: str, fixed: Sequence[str], settings: Mapping[str, JsonValue]) 
 
 
 def _named(loaded: LoadedRecipe, settings: Mapping[str, JsonValue]) -> LoadedRecipe:
-    """The recipe under a name that contains its settings, the same in every sweep that has it."""
+    """The recipe renamed by its settings; the name is the same in every sweep that contains it."""
     if not settings:
         return loaded
     name = _slug([loaded.recipe.name, *(f"{_leaf(path)}-{written(value)}" for path, value in settings.items())])
@@ -195,7 +195,7 @@ def _slug(words: Sequence[str]) -> str:
 
 
 def written(value: JsonValue) -> str:
-    """A value as `--set` takes it."""
+    """A value in the syntax of `--set`."""
     if isinstance(value, str):
         with contextlib.suppress(RecipeError):
             if plain(read_value(value, "")) == value:
@@ -204,7 +204,7 @@ def written(value: JsonValue) -> str:
 
 
 def _expanded(values: Sequence[JsonValue], place: str) -> list[JsonValue]:
-    """The values of an axis, `0..4` written out, without repetitions. Raises `RecipeError`."""
+    """The values of an axis with `0..4` expanded, without repetitions. Raises `RecipeError`."""
     found: list[JsonValue] = []
     for value in values:
         ends = INTEGERS.fullmatch(value) if isinstance(value, str) else None

@@ -1,4 +1,4 @@
-"""Controllers that others trained, as rivals."""
+"""Third-party controllers as baselines."""
 
 from collections.abc import Iterator
 from typing import Literal
@@ -10,26 +10,26 @@ from iowbc.recipe.section import COSMETIC, Section
 
 
 class PublicController(Section):
-    """A public controller. The recipe holds its digest, and nothing of its content."""
+    """A public controller. The recipe holds its digest, not its content."""
 
     adapter: Literal["holosoma", "deploy", "own"]
-    """Description of its observation, action, gains and frequency: of the walkers of `holosoma`, of a folder with a
-    network and the `deploy.yaml` of Isaac Lab exports, or one's own `module`."""
+    """Source of its observation, action, gains and frequency: `holosoma`: the walking policies of that project;
+    `deploy`: a folder with a network and the `deploy.yaml` of Isaac Lab exports; `own`: a custom `module`."""
     module: ModuleFile | None = None
     """Python file with a function `adapter(policy)`, which takes the controller's path and returns an
     `iowbc.adapters.adapter.Adapter`; for the adapter `own` alone."""
     policy: str = Field(min_length=1, json_schema_extra=COSMETIC)
-    """Its file or folder: a path from the working folder, or PACKAGE:PATH for a file of an installed package."""
+    """Its file or folder: a path relative to the working folder, or PACKAGE:PATH for a file of an installed package."""
     sha256: str = Field(pattern="^[0-9a-f]{64}$")
-    """SHA-256 of the file; of a folder that of its sorted lines `DIGEST  NAME`, as `sha256sum` prints them."""
+    """SHA-256 of the file; for a folder, SHA-256 of its sorted lines `DIGEST  NAME`, as `sha256sum` prints them."""
     arms: Literal["measured", "default", "free", "own"] = "measured"
-    """Control and observation of arms. `measured`, `default`: this project's inverse kinematics holds the grasp, and
-    the controller observes the arms as measured, or in its default posture at rest (a grasp may disturb a walker that
-    was trained to move its arms; choose on development trials). `own`: the controller moves the arms, with its own
-    gains. `free`: it does so in trials without an object."""
+    """Control and observation of the arms. `measured`, `default`: this project's inverse kinematics holds the grasp;
+    the controller observes the arms as measured, or at rest in its default posture (observed grasps may disturb a
+    policy that was trained to move its arms; choose on development trials). `own`: the controller moves the arms, with
+    its own gains. `free`: it moves them in trials without an object only."""
     heading_gain: float = Field(default=0.5, ge=0.0)
-    """Commanded yaw rate against each radian of heading error [1/s]: such a controller follows rates and drifts, where
-    learnt policies of this project observe the error. Velocity tasks of Isaac Lab train with 0.5."""
+    """Yaw rate commanded per radian of heading error [1/s]. These controllers track rates and therefore drift; learnt
+    policies of this project observe the heading error. Velocity tasks of Isaac Lab train with 0.5."""
 
     @property
     def moves_arms(self) -> bool:

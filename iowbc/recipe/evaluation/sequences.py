@@ -1,7 +1,7 @@
-"""Commands of trials: stretches of a sequence, scripts that are drawn trial by trial, and the fixed sequences.
+"""Commands of trials: segments of a sequence, scripts drawn per trial, and fixed sequences.
 
-All fixed ones ask for steps: a robot that stands still fails every one. Each changes no faster than
-`task.commands.rates` allow and asks for no posture outside of the feasible map.
+All fixed sequences command steps, so that a robot that stands still fails each of them. They respect
+`task.commands.rates` and stay within the feasible postures.
 """
 
 from collections.abc import Iterator
@@ -12,11 +12,11 @@ from pydantic import Field
 from iowbc.recipe.section import Range, Section
 
 Offset = Annotated[float, Field(ge=-0.5, le=0.5)]
-"""Wrist offset along an axis [m]; no arm of this size takes its wrist farther from the grasp."""
+"""Wrist offset along an axis [m]; arms of this size cannot reach farther from the grasp."""
 
 
 class Segment(Section):
-    """A stretch of a command sequence; the command moves to these values over `ramp` and then holds."""
+    """Segment of a command sequence; the command moves linearly to these values over `ramp` and then holds."""
 
     duration: float = Field(gt=0, le=600)
     """Length of the segment, its ramp included [s]."""
@@ -25,7 +25,7 @@ class Segment(Section):
     velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Commanded v_x, v_y [m/s] and yaw rate [rad/s] in the heading frame."""
     height: float | None = Field(default=None, ge=0.3, le=1.0)
-    """Commanded pelvis height [m], which no humanoid of this size exceeds; empty takes the task's default height."""
+    """Commanded pelvis height [m]; no humanoid of this size exceeds 1. Empty: the task's default height."""
     pitch: float = Field(default=0.0, ge=-1.6, le=1.6)
     """Commanded torso pitch [rad], positive leans forward."""
     wrists: tuple[Offset, Offset, Offset, Offset, Offset, Offset] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -37,22 +37,22 @@ class Segment(Section):
 
 
 class DrawnScripts(Section):
-    """Every script holds the same kinds of motion in a drawn order, each with drawn sizes and times.
+    """Random command scripts: every script has the same kinds of motion, in random order, with random values and times.
 
     With an object in the hands, or without one: walk, walk with raised hands, turn left and right, walk back and
     sideways, crouch, bow, stop. Behind a crate: push straight, in a left and a right turn, from a crouch, stop bowed,
-    stop upright. Sizes are clipped to the ranges of `task.commands`, and commands change as fast as its rates allow.
+    stop upright. Values are clipped to the ranges of `task.commands`, and commands change as fast as its rates allow.
     """
 
     duration: float = Field(default=24.0, ge=12.0, le=600.0)
-    """Time of a script [s]: nine kinds of motion with a second or two at each. A script whose ramps leave less than
-    `shortest_hold` for each is longer."""
+    """Duration of a script [s]: nine kinds of motion, each held for a second or two. A script is longer if its ramps
+    would leave less than `shortest_hold` for each."""
     start: float = Field(default=1.0, ge=0.0)
-    """Time for which the robot stands at first [s]: the object's weight comes to bear."""
+    """Initial standing time [s], in which the hands take up the object's weight."""
     shortest_hold: float = Field(default=0.5, gt=0.0)
     """Shortest time for which a command is held after its ramp [s]."""
     walking: Range = (0.3, 0.5)
-    """Forward speed [m/s]; from what is worth a step to that of the fixed sequences."""
+    """Forward speed [m/s]; the upper end is that of the fixed sequences."""
     backward: Range = (0.2, 0.3)
     """Backward speed [m/s]; training draws up to 0.3."""
     sideways: Range = (0.15, 0.2)
@@ -66,7 +66,7 @@ class DrawnScripts(Section):
     pitch: Range = (-0.2, 0.4)
     """Torso pitch in such a posture [rad]."""
     posture_share: float = Field(default=0.5, ge=0.0, le=1.0)
-    """Part of the walks and stops in another posture than the nominal one."""
+    """Fraction of the walks and stops in another posture than the nominal one."""
     raised: Range = (0.02, 0.05)
     """Height of raised hands above their grasp [m]."""
     crouch: Range = (0.5, 0.6)
@@ -74,8 +74,7 @@ class DrawnScripts(Section):
     bow: Range = (0.4, 0.75)
     """Torso pitch of a bow while standing [rad]; as far as `task.commands.pitch` goes."""
     deep_share: float = Field(default=0.1, ge=0.0, le=1.0)
-    """Part of the bows that go on to the paper's range, up to `task.commands.deep_pitch`; as often as training draws
-    them."""
+    """Fraction of deep bows, over the paper's range up to `task.commands.deep_pitch`; by default as in training."""
     bow_height: Range = (0.64, 0.72)
     """Pelvis height of a bow [m]; at 1.5 rad 0.62 to 0.72 m are feasible."""
 
@@ -107,26 +106,26 @@ PUSHING = (
     Segment(duration=2.0, height=0.76, pitch=-0.2, ramp=1.8),
 )
 """Stand, push in a left turn, push lower and leaning, push from a crouch, push in a right turn, stop bowed, rise: 20 s.
-Neither back nor sideways, for the hands do not hold the crate, and turns as slow as two palms can make it turn."""
+No backward or sideways motion, because the hands do not hold the crate; turns are as slow as two palms can turn it."""
 
 STAGNATION = (
     Segment(duration=1.0, ramp=0.0),
     Segment(duration=7.0, velocity=(0.5, 0.0, 0.0), pitch=0.2),
     Segment(duration=2.0, pitch=0.2),
 )
-"""Push against what does not give way, and stop: 10 s."""
+"""Push against an immovable crate, and stop: 10 s."""
 
 WALKING_ON = (Segment(duration=3.0, velocity=(0.4, 0.0, 0.0)),)
 """Walk: 3 s."""
 
 STANDING = (Segment(duration=5.0, ramp=0.0), *WALKING_ON)
-"""Stand, which is when the robot is pushed, and walk on: 8 s."""
+"""Stand (when the robot is pushed), then walk: 8 s."""
 
 WALKING = (Segment(duration=1.0, ramp=0.0), Segment(duration=7.0, velocity=(0.4, 0.0, 0.0)))
-"""Walk, which is when the robot is pushed: 8 s."""
+"""Walk (when the robot is pushed): 8 s."""
 
 BOWING = (Segment(duration=2.0, ramp=0.0), Segment(duration=7.0, height=0.68, pitch=1.4, ramp=3.0))
-"""Bow while standing, to where the paper's range nearly ends, and hold it."""
+"""Bow while standing, to nearly the end of the paper's range, and hold."""
 
 PROBED = (
     Segment(duration=2.0, ramp=0.0),

@@ -1,5 +1,5 @@
-"""Groups of trials: sweeps over mass, single cases, pushes that grow until the robot falls, a map of pushes, a probe of
-the history, and interaction with partners."""
+"""Suites of trials: mass sweeps, single cases, pushes of increasing impulse, a map of pushes, a probe of the history,
+and interaction with partners."""
 
 from collections.abc import Iterator
 from typing import Annotated, Literal, get_args
@@ -15,53 +15,52 @@ PartnerShare = Annotated[float, Field(ge=-1, le=1)] | None
 
 
 class Beyond(Section):
-    """Continuation of a sweep past its last mass, until nothing survives."""
+    """Continuation of a sweep past its last mass, until no trial survives."""
 
     step: float = Field(default=2.0, gt=0)
-    """Mass added at a time [kg]."""
+    """Mass increment [kg]."""
     limit: float = Field(default=30.0, gt=0)
-    """No mass above this is tried [kg]."""
+    """Largest mass [kg]."""
 
 
 class WithShare(Section):
-    """Deviations of a sweep where the partner has a certain share."""
+    """Overrides of a sweep's settings for one partner share."""
 
     partner_share: float = Field(ge=-1, le=1)
-    """The share, one of the sweep's."""
+    """The share, one of the sweep's `partner_shares`."""
     masses: Masses | None = Field(default=None, min_length=1)
-    """Object masses [kg], ascending; empty takes the sweep's."""
+    """Object masses [kg], ascending; empty: the sweep's."""
     rolling_resistance: float | None = Field(default=None, ge=0, le=1)
-    """Rolling resistance μ; empty takes the sweep's."""
+    """Rolling resistance μ; empty: the sweep's."""
 
 
 class MassSweep(Section):
     """Trials over a range of object masses in one scene."""
 
     scene: ObjectScene = "lift"
-    """Scene of `simulation.scenes` or `eval.scenes` in which the object is met."""
+    """Scene of `simulation.scenes` or `eval.scenes` with the object."""
     masses: Masses = Field(default=(0.05, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0), min_length=1)
     """Object masses [kg], ascending; none is lighter than the object's `smallest_mass`."""
     no_object: bool = True
-    """Also play the commands once in the scene without an object, without a partner: the row "no object"."""
+    """Also run the commands once without object and partner: the row "no object"."""
     undisturbed: Masses = ()
-    """Masses of a second suite without impulses and pushes [kg], where `eval.disturbances` are on; empty has none."""
+    """Masses of an additional suite without impulses and pushes if `eval.disturbances` is on [kg]; empty: none."""
     beyond: Beyond | None = None
-    """Heavier masses, tried as long as one trial survives; empty stops at the last mass."""
+    """Heavier masses, for as long as one trial survives; empty: stop at the last mass."""
     rolling_resistance: float | None = Field(default=None, ge=0, le=1)
-    """Rolling resistance μ of the crate's wheels; empty draws it as in training."""
+    """Rolling resistance μ of the crate's wheels; empty: drawn as in training."""
     partner_shares: tuple[PartnerShare, ...] = Field(default=(0.0, 0.5), min_length=1)
-    """The sweep is made once with each: part of the weight, or in pushing of the rolling resistance, that the partner
-    bears; negative resists, 0 leaves all of it to the robot, empty draws it as in training."""
+    """Fractions of the weight (in pushing, of the rolling resistance) that the partner bears; the sweep runs once for
+    each. Negative: the partner resists; 0: the robot bears all; empty: drawn as in training."""
     with_share: tuple[WithShare, ...] = ()
     """Other masses, or another rolling resistance, for some of these shares."""
     fixed: Held = Field(default_factory=dict)
-    """Any other randomised quantity that is held at a value instead of being drawn, by its name."""
+    """Fixed values of other randomized quantities, by name."""
     sequence: tuple[Segment, ...] = ()
-    """Command sequence of this sweep; empty takes `eval.sequence`, or else `eval.scripts`, or else that of lifting or
-    pushing."""
+    """Command sequence of this sweep; empty: `eval.sequence`, else `eval.scripts`, else that of lifting or pushing."""
 
     def at(self, share: float | None) -> "MassSweep":
-        """The sweep as it is with one share of the partner's."""
+        """The sweep for one partner share, with the overrides of `with_share` applied."""
         own = [one for one in self.with_share if one.partner_share == share]
         given = {name: value for one in own for name, value in one if value is not None and name != "partner_share"}
         return self.model_copy(update={**given, "partner_shares": (share,), "with_share": ()})
@@ -82,30 +81,29 @@ class Case(Section):
     scene: ObjectScene = "lift"
     """Scene of `simulation.scenes`."""
     mass: float = Field(default=4.0, ge=0)
-    """Object mass [kg]; a mass of 0 is played in the scene without an object."""
+    """Object mass [kg]; 0: no object."""
     rolling_resistance: float | None = Field(default=None, ge=0)
-    """Rolling resistance μ of the crate's wheels; empty draws it as in training."""
+    """Rolling resistance μ of the crate's wheels; empty: drawn as in training."""
     partner_share: PartnerShare = 0.0
-    """As in a sweep."""
+    """Fraction of the weight or rolling resistance that the partner bears, as in a sweep."""
     fixed: Held = Field(default_factory=dict)
-    """Any other randomised quantity that is held at a value instead of being drawn, by its name."""
+    """Fixed values of other randomized quantities, by name."""
     sequence: tuple[Segment, ...] = ()
-    """Command sequence of this case; empty takes `eval.sequence`, or else `eval.scripts`, or else that of lifting or
-    pushing."""
+    """Command sequence of this case; empty: `eval.sequence`, else `eval.scripts`, else that of lifting or pushing."""
     repetitions: int = Field(default=1, ge=1)
-    """Times that the sequence is played in a row; drawn scripts differ from one to the next."""
+    """Repetitions of the sequence within a trial; drawn scripts differ between repetitions."""
 
 
 class HeavyCase(Case):
     """One of the paper's heavy tasks, reported by its success rate."""
 
     partner_share: PartnerShare = 0.5
-    """As in a sweep; half of the load by default, for these are carried by two."""
+    """Fraction of the load that the partner bears, as in a sweep; half by default, since two carry these objects."""
 
 
 class Stagnation(Section):
-    """Pushes that cannot succeed (paper IV-D). Success is to go on pushing, upright in posture, on feet that do not
-    slide; E_v is expected to be large."""
+    """Infeasible pushes (paper IV-D). Success: continued pushing in the commanded posture, on feet that do not slide;
+    E_v is expected to be large."""
 
     cases: tuple[Case, ...] = Field(
         default=(
@@ -119,9 +117,9 @@ class Stagnation(Section):
         ),
         min_length=1,
     )
-    """With fifty times its rolling resistance the 65 kg crate resists with 638 N or more, where foot friction of 0.5,
-    the least of training, allows 164 N. On better ground a robot in the commanded posture tips over before it pushes
-    with half of what friction allows."""
+    """Cases of the suite. By default, a 65 kg crate with fifty times its rolling resistance resists with 638 N or more,
+    whereas foot friction of 0.5, the smallest of training, allows 164 N. With higher friction, a robot in the commanded
+    posture tips over before it pushes with half of what friction allows."""
 
 
 Direction = Literal[
@@ -131,8 +129,8 @@ EIGHT: tuple[Direction, ...] = get_args(Direction)
 
 
 class PushLadder(Section):
-    """Pushes on the base that grow until the robot falls: the impulse survived in each direction. The robot has to
-    walk after it."""
+    """Pushes on the base with increasing impulse until the robot falls. They measure the impulse survived in each
+    direction; the robot must walk afterwards."""
 
     scene: ObjectScene = "lift"
     """Scene of `simulation.scenes`."""
@@ -141,20 +139,19 @@ class PushLadder(Section):
     directions: tuple[Direction, ...] = EIGHT
     """Horizontal directions in the frame of the robot's heading."""
     trials: int | None = Field(default=5, ge=1, le=10_000)
-    """Trials of each size and direction; empty takes `eval.trials`. Few, for neighbours support each other."""
+    """Trials per impulse and direction; empty: `eval.trials`. Few suffice: neighbouring results support each other."""
     impulses: Ascending = (10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0)
-    """Sizes tried [N·s], ascending; 37 N·s would give robot and 4 kg box 1 m/s in the air."""
+    """Impulses [N·s], ascending; 37 N·s would accelerate a free robot with a 4 kg box to 1 m/s."""
     time: float = Field(default=2.0, ge=0)
-    """When the push begins [s]."""
+    """Start of the push [s]."""
     duration: float = Field(default=0.1, gt=0)
-    """Time over which it acts, as a constant force [s]."""
+    """Duration of the push, a constant force [s]."""
     sequence: tuple[Segment, ...] = Field(default=STANDING, min_length=1)
-    """Commands while it is pushed."""
+    """Commands during the trial."""
 
 
 class Robustness(Section):
-    """Trials that the paper does not have: conditions outside of the training's, long trials, pushes until the robot
-    falls."""
+    """Trials beyond the paper's: conditions outside those of training, long trials, pushes until the robot falls."""
 
     cases: tuple[Case, ...] = (
         Case(name="nominal"),
@@ -176,20 +173,19 @@ class Robustness(Section):
         Case(name="bow 1.4 rad", sequence=(*BOWING, Segment(duration=3.0, ramp=2.5), *WALKING_ON)),
         Case(name="60 s", repetitions=3),
     )
-    """Conditions with a 4 kg box: twice the training's largest bias of encoders [rad], inertial unit [rad], gyroscope
-    [rad/s], twice its change of gains and loss of strength, the least that the linkages give in training besides,
-    actions and sensors late by one and a half control periods each, less than training's least friction, 30 kg crates
-    at both ends of the rolling resistance, boxes narrower and wider than training's 0.25 m, loads further from the
-    middle than training's 3 cm, palms that hold the box by nothing but friction, the paper's deepest bow, three
-    sequences in a row."""
+    """Conditions, by default with a 4 kg box: twice the largest bias in training of encoders [rad], IMU [rad] and
+    gyroscope [rad/s]; twice its change of gains and loss of motor strength, the latter also with its smallest linkage
+    effort; action and sensor latency of one and a half control periods each; friction below its smallest; 30 kg crates
+    at both ends of the rolling resistance; boxes narrower and wider than its 0.25 m; loads further off-centre than its
+    3 cm; a box held by friction alone; nearly the paper's deepest bow; three sequences in a row."""
     pushes: PushLadder | None = PushLadder()
-    """Pushes on the base while standing; empty leaves them out."""
+    """Pushes on the base while standing; empty: none."""
     walking_pushes: PushLadder | None = PushLadder(time=4.0, sequence=WALKING)
-    """Pushes on the base while walking; empty leaves them out."""
+    """Pushes on the base while walking; empty: none."""
 
 
 class PushMap(Section):
-    """Pushes at every rolling resistance and mass: a mass alone says little of how hard a crate is to push."""
+    """Pushes over a grid of rolling resistance and mass, because mass alone does not determine the required force."""
 
     scene: ObjectScene = "push"
     """Scene of `simulation.scenes` with a crate."""
@@ -198,37 +194,38 @@ class PushMap(Section):
     masses: Ascending = (10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0)
     """Masses [kg]."""
     partner_share: float = Field(default=0.0, ge=-1, le=1)
-    """Part of the rolling resistance that the partner overcomes."""
+    """Fraction of the rolling resistance that the partner overcomes."""
     trials: int | None = Field(default=5, ge=1, le=10_000)
-    """Trials of each pair; empty takes `eval.trials`. Few, for neighbours in the map support each other."""
+    """Trials of each pair; empty: `eval.trials`. Few suffice, since neighbouring results support each other."""
     sequence: tuple[Segment, ...] = ()
-    """Commands; empty takes those of the sweeps."""
+    """Commands; empty: those of the sweeps."""
 
 
 class Probe(Section):
-    """Trials with masses spread over a range, and a linear regression of the mass on what the policy sees in them.
+    """Linear regression of the object's mass on the policy's observations, in trials with evenly spread masses.
 
-    Every other trial is regressed on, those between them are tested: the masses tested are none that were learnt.
+    Trials alternate between training and test set, so that no tested mass was trained on.
     """
 
     scene: ObjectScene = "lift"
     """Scene of `simulation.scenes`, with an object."""
     masses: tuple[PositiveFloat, PositiveFloat] = (1.0, 10.0)
-    """Lightest and heaviest object [kg]; the trials' masses are spread evenly between them. The default is what
-    training carries of the box."""
+    """Lightest and heaviest object [kg]; the trials' masses are spread evenly between them. The default is the range of
+    box masses in training."""
     trials: int = Field(default=180, ge=20, le=2000)
-    """Number of trials, each with a mass and a seed of its own. Some 70 numbers are drawn once for a trial: a
-    regression on fewer trials than that cannot tell which of them is the mass."""
+    """Number of trials, each with its own mass and seed. Each trial draws some 70 random quantities: a regression on
+    fewer trials than that cannot distinguish the mass from the others."""
     seed: int = Field(default=9000, ge=0, lt=2**32)
-    """Seed of the first trial: apart from those of training, its checks, evaluation and export."""
+    """Seed of the first trial; distinct from those of training, its checks, evaluation and export."""
     partner_share: PartnerShare = 0.0
-    """As in a sweep. Without a partner, for what the hands feel of a mass is what he leaves."""
+    """Fraction of the weight that a partner bears, as in a sweep. It is zero by default, because the hands feel only
+    the remaining weight."""
     fixed: Held = Field(default_factory=dict)
-    """Any other randomised quantity that is held at a value instead of being drawn, by its name."""
+    """Fixed values of other randomized quantities, by name."""
     sequence: tuple[Segment, ...] = Field(default=PROBED, min_length=1)
     """Commands of a trial, in order; gentle, so that few end early."""
     interval: float = Field(default=0.5, gt=0)
-    """Time between two readings [s]; as long as a history of 25 observations, so that no two share one."""
+    """Time between two samples [s]: the length of a history of 25 observations, so that samples share none."""
 
     def problems(self) -> Iterator[tuple[str, str]]:
         if self.masses[0] >= self.masses[1]:
@@ -236,8 +233,8 @@ class Probe(Section):
 
 
 class Impedance(Section):
-    """Sinusoidal pulls on the centre of mass of a held object, from whose motion the mechanical impedance follows. The
-    robot stands meanwhile and nobody else holds the object; it then has to walk on."""
+    """Sinusoidal forces on the centre of mass of a held object; its motion yields the mechanical impedance. The robot
+    stands and holds the object alone; afterwards it must walk."""
 
     scene: ObjectScene = "lift"
     """Scene of `simulation.scenes`."""
@@ -246,41 +243,41 @@ class Impedance(Section):
     directions: tuple[Literal["x", "y"], ...] = Field(default=("x", "y"), min_length=1)
     """Directions of the pull: forward (x) and to the left (y) of the commanded heading."""
     frequencies: tuple[PositiveFloat, ...] = Field(default=(0.2, 0.5, 1.0, 2.0), min_length=1)
-    """Frequencies [Hz]: from the slow yielding to a leading partner to the frequency of steps."""
+    """Frequencies [Hz]: from that of yielding to a leading partner to that of steps."""
     amplitude: float = Field(default=10.0, gt=0)
-    """Amplitude of the force [N]; small against the partner's 80 N, large against the noise of a balancing robot."""
+    """Amplitude of the force [N]; small compared with the partner's 80 N, large compared with balancing motion."""
     begin: float = Field(default=2.0, ge=0)
-    """Time at which the pull begins [s]."""
+    """Start of the pull [s]."""
     cycles: int = Field(default=3, ge=1)
-    """Fewest periods of a pull."""
+    """Smallest number of periods of a pull."""
     shortest: float = Field(default=6.0, gt=0)
-    """Shortest pull [s]; it lasts a whole number of periods."""
+    """Smallest duration of a pull [s]; it lasts a whole number of periods."""
     walk: tuple[Segment, ...] = Field(default=WALKING_ON, min_length=1)
-    """Commands after the pull: a robot that does not move at all fails them."""
+    """Commands after the pull; a robot that stands still fails them."""
 
 
 class Compliance(Section):
-    """Partners that behave in different ways, a crate that is blocked, and sinusoidal pulls; without impulses and
-    pushes, so that every force is that of the interaction."""
+    """Partners of different behaviour, a blocked crate, and sinusoidal pulls; without random impulses and pushes, so
+    that all forces are interaction forces."""
 
     scene: ObjectScene = "lift"
     """Scene of `simulation.scenes`, with an object that is held."""
     masses: tuple[PositiveFloat, ...] = Field(default=(4.0,), min_length=1)
     """Object masses [kg]."""
     partner_shares: tuple[float, ...] = Field(default=(0.5,), min_length=1)
-    """Parts of the weight that the partner bears."""
+    """Fractions of the weight that the partner bears."""
     behaviours: tuple[str, ...] = BEHAVIOURS
-    """Behaviours of the partner, a case each; the last two are never trained with."""
+    """Partner behaviours, one case each; the last two never occur in training."""
     trials: int | None = Field(default=None, ge=1, le=10_000)
-    """Trials of each case; empty takes `eval.trials`."""
+    """Trials of each case; empty: `eval.trials`."""
     sequence: tuple[Segment, ...] = ()
-    """Commands; empty takes those of the sweeps."""
+    """Commands; empty: those of the sweeps."""
     blocked: Case | None = Case(
         name="blocked crate", scene="push", mass=65.0, fixed={"resistance_scale": 50.0}, sequence=STAGNATION
     )
-    """A push against what does not move; empty leaves it out."""
+    """Push against an immovable crate; empty: none."""
     impedance: Impedance | None = Impedance()
-    """Sinusoidal pulls; empty leaves them out."""
+    """Sinusoidal pulls; empty: none."""
 
     def problems(self) -> Iterator[tuple[str, str]]:
         for name in self.behaviours:

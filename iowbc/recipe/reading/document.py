@@ -1,4 +1,4 @@
-"""A YAML file as a tree that remembers where each value stands, and a resolved recipe as YAML."""
+"""Reading of a YAML file as a tree with the location of each value; writing of a resolved recipe as YAML."""
 
 import re
 from collections.abc import Callable, Iterator
@@ -14,26 +14,26 @@ Scalar: TypeAlias = "str | int | float | bool | None"
 Tree: TypeAlias = "dict[str, Located] | list[Located] | Scalar"
 Plain: TypeAlias = "dict[str, Plain] | list[Plain] | Scalar"
 PlaceOf: TypeAlias = Callable[[Any], str]
-"""Names the place of one of PyYAML's marks."""
+"""Converts a PyYAML mark to a location."""
 
 MAXIMUM_DEPTH = 40
-"""Deeper nesting is an alias that contains itself."""
+"""Largest nesting depth; deeper nesting indicates an alias that contains itself."""
 MAXIMUM_NODES = 100_000
-"""More values are aliases that multiply each other."""
+"""Largest number of values; more indicate aliases that multiply each other."""
 LONGEST_NUMBER = 100
-"""Characters of the longest number that is read: what computing with it costs grows with their square."""
+"""Largest number of characters of a number: the cost of parsing grows with their square."""
 
 
 @dataclass(frozen=True)
 class Located:
-    """A value and where it was written: `file:line:column` of its key, `--set ...`, or `default`."""
+    """A value and its location: `file:line:column` of its key, `--set ...`, or `default`."""
 
     value: Tree
     place: str
 
 
 class _Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
-    """Resolves scalars as YAML 1.2 does: `1e-3` is a number; `on`, `010` and `1:30` mean what they look like."""
+    """Resolves scalars by YAML 1.2: `1e-3` is a number, `010` is decimal, `on` and `1:30` are text."""
 
     yaml_implicit_resolvers: dict[str, list[tuple[str, re.Pattern[str]]]] = {}  # noqa: RUF012 (PyYAML's own attribute)
 
@@ -52,7 +52,7 @@ IMPLICIT = (
         list("-+.0123456789"),
     ),
 )
-"""Bare words that are no text: tag, pattern, and the characters that they begin with."""
+"""Unquoted scalars that are not text: tag, pattern, and possible first characters."""
 for _tag, _pattern, _first in IMPLICIT:
     _Loader.add_implicit_resolver(_tag, _pattern, _first)
 
@@ -66,7 +66,7 @@ def read_document(text: str, file: str) -> Located:
 
 
 def read_value(text: str, place: str) -> Located:
-    """The tree of a value given on the command line; everything in it stands at `place`."""
+    """The tree of a value given on the command line; all its values have the location `place`."""
     return _read(text, lambda mark: place, place)
 
 
@@ -92,7 +92,7 @@ def _read(text: str, place_of: PlaceOf, root: str) -> Located:
 
 
 def _limit_depth(text: str, place_of: PlaceOf) -> None:
-    """Raises `RecipeError` for nesting that would overflow the stack of the parser written in C."""
+    """Raises `RecipeError` for nesting that would overflow the stack of the C parser."""
     depth = 0
     for event in yaml.parse(text, Loader=_Loader):
         if isinstance(event, yaml.CollectionStartEvent):
@@ -104,7 +104,7 @@ def _limit_depth(text: str, place_of: PlaceOf) -> None:
 
 
 class _Builder:
-    """Turns PyYAML's nodes into a tree and gathers what is wrong with them."""
+    """Converts PyYAML nodes to a tree and collects problems."""
 
     def __init__(self, place_of: PlaceOf) -> None:
         self.place_of = place_of
@@ -162,7 +162,7 @@ class _Builder:
 
 
 def plain(tree: Located) -> Plain:
-    """The tree without its places."""
+    """The tree's values without locations."""
     if isinstance(tree.value, dict):
         return {key: plain(entry) for key, entry in tree.value.items()}
     if isinstance(tree.value, list):
@@ -171,7 +171,7 @@ def plain(tree: Located) -> Plain:
 
 
 def located(value: object, place: str) -> Located:
-    """Plain data (mappings, sequences, scalars) as a tree that stands at one place."""
+    """Plain data (mappings, sequences, scalars) as a tree with a single location."""
     if isinstance(value, dict):
         return Located({str(key): located(entry, place) for key, entry in value.items()}, place)
     if isinstance(value, (list, tuple)):
@@ -182,7 +182,7 @@ def located(value: object, place: str) -> Located:
 
 
 def merged(base: Located, over: Located) -> Located:
-    """`over` laid upon `base`: mappings merge key by key, everything else (lists too) is replaced."""
+    """`over` merged into `base`: mappings merge key by key, everything else (lists too) is replaced."""
     if not (isinstance(base.value, dict) and isinstance(over.value, dict)):
         return over
     entries = dict(base.value)
@@ -205,7 +205,7 @@ def leaves(tree: Located, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[st
 
 
 class _Dumper(getattr(yaml, "CSafeDumper", yaml.SafeDumper)):  # type: ignore[misc]
-    """Puts in quotes what any version of YAML reads as something else than text: PyYAML alone leaves `1e3` bare."""
+    """Quotes text that any version of YAML reads as another type; PyYAML by itself does not quote `1e3`."""
 
 
 for _tag, _pattern, _first in IMPLICIT:

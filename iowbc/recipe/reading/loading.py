@@ -15,20 +15,20 @@ from iowbc.recipe.recipe import Recipe
 SUFFIXES = (".yaml", ".yml")
 PACKAGE = Path(__file__).resolve().parents[2]
 LARGEST_FILE = 1_000_000
-"""Bytes of the largest recipe that is read."""
+"""Largest size of a recipe file [bytes]."""
 LONGEST_PATH = 300
-"""Number of last characters of an unreadable path that an error shows."""
+"""Number of trailing characters of an unreadable path shown in an error."""
 LONGEST_CHAIN = 20
-"""Recipes that extend one another, at most."""
+"""Largest length of a chain of `extends`."""
 OWN_KEYS = ("name", "description")
-"""Keys that a recipe never inherits: they say which experiment this is."""
+"""Keys that a recipe never inherits, because they identify the experiment."""
 
 
 def recipe_file(word: str | Path) -> Path:
-    """The file that a word means: the file itself, or, for a bare name with or without ending, the first of that name.
+    """Resolve a path, or a bare name with or without extension, to a recipe file.
 
-    Looked through are `./recipes`, the recipes of this checkout, and those of the installed package. A word that means
-    nothing comes back as it is, for the reader to complain about.
+    Names are searched in `./recipes`, the recipes of this checkout, and those of the installed package; the first match
+    counts. Without a match the word is returned as a path, and reading it raises the error.
     """
     path = Path(word)
     if os.path.isfile(path) or path.name != str(word):
@@ -37,23 +37,23 @@ def recipe_file(word: str | Path) -> Path:
 
 
 def file_meant_in(folder: Path, word: str) -> Path:
-    """The file that `extends`, `teacher.start` or one of `variants` means in a recipe of a folder: one beside it, with
-    or without ending, else what the word means anywhere."""
+    """Resolve `extends`, `teacher.start` or one of `variants` in a recipe in `folder`: a file in that folder, with or
+    without extension, else as `recipe_file` does."""
     beside = [Path(os.path.normpath(folder / f"{word}{ending}")) for ending in ("", *SUFFIXES)]
     return next((found for found in (*beside, recipe_file(word)) if os.path.isfile(found)), beside[0])
 
 
 def known_files() -> Iterator[Path]:
-    """The recipes that can be named without their folder, nearest first."""
+    """Recipes that can be named without their folder, in order of precedence."""
     for folder in (Path("recipes"), PACKAGE.parent / "recipes", PACKAGE / "recipes"):
         for suffix in SUFFIXES:
             yield from sorted(folder.glob(f"*{suffix}"))
 
 
 def overridden(tree: Located, overrides: Sequence[str]) -> Located:
-    """The tree with each override laid upon it, in order.
+    """Apply the overrides to the tree, in order.
 
-    A number in the path is an index of a list, which may be one that the recipe has by default. Raises `RecipeError`.
+    A number in a path is an index of a list, which may be a default of the recipe. Raises `RecipeError`.
     """
     for override in overrides:
         place = f"--set {override}"
@@ -88,7 +88,7 @@ def _replaced(tree: Located, path: tuple[str, ...], value: Located, place: str, 
 
 
 def _default(path: tuple[str, ...], place: str) -> Located:
-    """The list that a recipe has at a path when it says nothing there; anything else starts empty."""
+    """The recipe's default list at a path; for any other default, an empty tree."""
     found: Located | None = defaults()
     for name in path:
         found = found.value.get(name) if found is not None and isinstance(found.value, dict) else None
@@ -96,9 +96,9 @@ def _default(path: tuple[str, ...], place: str) -> Located:
 
 
 def with_files(tree: Located, folder: Path) -> Located:
-    """The tree with each named file as it is now; paths are taken from the recipe's file that says them.
+    """Embed the current content of all named files; paths are relative to the recipe file that contains them.
 
-    `folder`: from where those are taken that are said on the command line. Raises `RecipeError`.
+    `folder`: base of paths given on the command line. Raises `RecipeError`.
     """
     problems = []
 
@@ -129,10 +129,10 @@ class LoadedRecipe:
     file: Path
     overrides: tuple[str, ...]
     places: Mapping[str, str]
-    """Place of each value that a file or an override wrote, by dotted path."""
+    """Location of each value set by a file or an override, by dotted path."""
 
     def place(self, path: str) -> str:
-        """Place where the value at a dotted path was written (`file:line:column`, `--set ...`), or `default`."""
+        """Location of the value at a dotted path (`file:line:column`, `--set ...`), or `default`."""
         parts = path.split(".")
         for length in range(len(parts), 0, -1):
             found = self.places.get(".".join(parts[:length]))
@@ -144,8 +144,8 @@ class LoadedRecipe:
 def load_recipe(file: Path | str, overrides: Sequence[str] = ()) -> LoadedRecipe:
     """Load, inherit, override and validate. Raises `RecipeError` with every problem and its line.
 
-    `file` may also be the name of a recipe that lies in a folder `recipes`, here or in the package. A recipe's name is
-    its file's name unless it says otherwise; name and description are not inherited.
+    `file` may also be the name of a recipe in a folder `recipes`, here or in the package. A recipe's name defaults to
+    its file's name; name and description are not inherited.
     """
     file = recipe_file(file)
     tree = _resolve(os.fspath(file), (), f"{file}:1:1")
@@ -163,7 +163,7 @@ def load_recipe(file: Path | str, overrides: Sequence[str] = ()) -> LoadedRecipe
 
 
 def _resolve(file: str, above: tuple[str, ...], place: str) -> Located:
-    """The tree of a file laid upon that of the recipe it extends."""
+    """The tree of a file merged into that of the recipe it extends."""
     if os.path.realpath(file) in map(os.path.realpath, above):
         raise RecipeError([Problem(place, f"recipes extend each other in a circle: {' -> '.join((*above, file))}")])
     if len(above) > LONGEST_CHAIN:
@@ -190,7 +190,7 @@ def _resolve(file: str, above: tuple[str, ...], place: str) -> Located:
 
 
 def read_text(file: str, place: str) -> str:
-    """The text of a recipe file. Raises `RecipeError` where it cannot be read."""
+    """The text of a recipe file. Raises `RecipeError` if it cannot be read."""
     try:
         return read_limited(Path(file), LARGEST_FILE).decode("utf-8")
     except UnicodeDecodeError as error:
@@ -206,8 +206,7 @@ def read_text(file: str, place: str) -> str:
 
 
 def _listed(missing: Path) -> str:
-    """Alternatives to a missing file: the files beside it, where one with an ending was asked for, and recipes by
-    name."""
+    """Alternatives to a missing file: files beside it, if its name has an extension, and recipes by name."""
     folder, with_ending = missing.parent, missing.suffix in SUFFIXES
     beside = sorted(found.name for found in folder.glob("*.yaml")) if with_ending and folder.is_dir() else []
     elsewhere = list(dict.fromkeys(found.name for found in known_files() if found.parent != folder))

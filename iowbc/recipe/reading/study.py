@@ -10,15 +10,15 @@ from iowbc.recipe.reading.loading import LoadedRecipe, file_meant_in, load_recip
 from iowbc.recipe.recipe import NAME
 
 MOST_VARIANTS = 100
-"""Recipes that one names, at most."""
+"""Largest number of variants of a study."""
 KEYS = ("name", "description", "variants")
-"""All that such a file holds; everything else belongs to the variants."""
+"""Permitted keys of a study file; all other settings belong to the variants."""
 
 
 def load_study(word: str | Path, overrides: Sequence[str] = ()) -> tuple[LoadedRecipe, ...]:
-    """The variants that a file names, each with the overrides; none for a recipe proper. Raises `RecipeError`.
+    """The variants of a study file, each with the overrides; empty for an ordinary recipe. Raises `RecipeError`.
 
-    A variant is named as on the command line, or relative to the file.
+    Variants are named as on the command line, or by a path relative to the file.
     """
     file = recipe_file(word)
     tree = read_document(read_text(str(file), f"{file}:1:1"), str(file))

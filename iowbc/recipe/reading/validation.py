@@ -1,4 +1,4 @@
-"""From a tree of values to a `Recipe`, with pydantic's errors in the words of the file."""
+"""Validation of a tree of values as a `Recipe`; pydantic's errors are reported by file location and key."""
 
 import functools
 import re
@@ -15,15 +15,15 @@ from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.section import NamedEntries, Unfitting
 
 LARGEST_NUMBER = 1e12
-"""No quantity, size or count of a recipe is larger."""
+"""Upper bound on every number in a recipe."""
 
 SEVERAL = re.compile(r"[^,],[^,]|\d\.\.\d")
 """Text that reads as more than one value: `1,2` or `0..4`."""
 
 
 def validate(tree: Located) -> Recipe:
-    """The recipe that a tree describes, laid upon the defaults: a section may hold any part of its keys, one that is
-    off by default, too.
+    """The recipe described by a tree merged into the defaults. Sections may be partial, including those that are off by
+    default.
 
     Raises `RecipeError` with all problems.
     """
@@ -47,12 +47,12 @@ def validate(tree: Located) -> Recipe:
 
 @functools.cache
 def defaults() -> Located:
-    """A recipe that says nothing, but for its name, which has to be given."""
+    """Tree of the default recipe, without the name, which is required."""
     return located(Recipe(name="default").model_dump(mode="json", exclude={"name"}), "default")
 
 
 def _opened(tree: Located, base: Located, path: tuple[str, ...] = ()) -> Located:
-    """The tree with each section that is off by default laid upon that section's own defaults."""
+    """The tree with each section that is off by default merged into that section's own defaults."""
     if not isinstance(tree.value, dict):
         return tree
     if base.value is None:
@@ -68,7 +68,7 @@ def _opened(tree: Located, base: Located, path: tuple[str, ...] = ()) -> Located
 
 
 def _of_its_own(path: Sequence[str]) -> Located:
-    """Defaults of the section at a path, if it has one for every key."""
+    """Defaults of the section at a path, if all its keys have one."""
     for model in models_at(path):
         try:
             return located(model().model_dump(mode="json"), "default")
@@ -78,7 +78,7 @@ def _of_its_own(path: Sequence[str]) -> Located:
 
 
 def _problems(tree: Located, errors: Sequence[ErrorDetails]) -> list[Problem]:
-    """One problem a place and key: what the members of a union say about the same value is joined."""
+    """One problem per location and key; messages of the members of a union about the same value are joined."""
     texts: dict[tuple[str, str], list[str]] = {}
     for place, head, text in (found for error in errors[:PROBLEMS_TOLD] for found in _each_problem(tree, error)):
         texts.setdefault((place, head), [])
@@ -89,7 +89,7 @@ def _problems(tree: Located, errors: Sequence[ErrorDetails]) -> list[Problem]:
 
 
 def _position(place: str) -> tuple[str, int, int]:
-    """File, line and column of a place, to sort by."""
+    """Sort key of a location: file, line and column."""
     rest, _, column = place.rpartition(":")
     file, _, line = rest.rpartition(":")
     return (file, int(line), int(column)) if line.isdecimal() and column.isdecimal() else (place, 0, 0)
@@ -140,7 +140,7 @@ def _problem(tree: Located, error: ErrorDetails) -> tuple[str, str, str]:
 
 
 def _meant(path: Sequence[str]) -> str:
-    """`; did you mean 'x'?` where an entry of a recipe's own lacks something and its name is nearly a known one."""
+    """`; did you mean 'x'?` for an incomplete custom entry whose name is close to a known one."""
     for model in models_at(path[:-1]) if path else ():
         if issubclass(model, NamedEntries) and path[-1] not in model.model_fields:
             return nearest(path[-1], model.model_fields)
@@ -148,7 +148,7 @@ def _meant(path: Sequence[str]) -> str:
 
 
 def descend(tree: Located, location: Sequence[int | str]) -> tuple[tuple[str, ...], Located]:
-    """The deepest value of the file that an error's location leads to; names of union members are skipped."""
+    """The deepest value of the file on the path of an error's location; names of union members are skipped."""
     path: list[str] = []
     for part in location:
         if isinstance(tree.value, dict) and str(part) in tree.value:
@@ -170,7 +170,7 @@ def models_at(path: Sequence[str]) -> list[type[BaseModel]]:
 
 
 def _alternatives(annotation: Any) -> Iterator[Any]:
-    """The members of a union; of anything else itself, without its marks."""
+    """Members of a union, or the annotation itself, without its metadata."""
     if get_origin(annotation) in (Union, types.UnionType):
         for member in get_args(annotation):
             yield from _alternatives(member)
@@ -185,7 +185,7 @@ def _models(annotation: Any) -> list[type[BaseModel]]:
 
 
 def _inside(annotation: Any, name: str) -> Iterator[Any]:
-    """Annotations of what `name` leads to inside a value of an annotation."""
+    """Annotations of the entry `name` of a value with the given annotation."""
     for model in (models := _models(annotation)):
         if name in model.model_fields:
             yield model.model_fields[name].annotation
@@ -197,7 +197,7 @@ def _inside(annotation: Any, name: str) -> Iterator[Any]:
 
 
 def _elsewhere(name: str) -> str:
-    """`; did you mean 'section.name'?` where a misplaced key belongs to exactly one other section."""
+    """`; did you mean 'section.name'?` for a misplaced key that belongs to exactly one other section."""
     places = [path for path in _known_paths(Recipe, ()) if path[-1] == name]
     return f"; did you mean '{'.'.join(places[0])}'?" if len(places) == 1 else ""
 

@@ -1,4 +1,4 @@
-"""Scenes, and quantities of an episode that a trial may hold at a value, by name: checked when a recipe is read."""
+"""Names of scenes, and of random quantities that a trial may fix; both are validated when a recipe is read."""
 
 from collections.abc import Iterator
 from typing import Annotated, Any
@@ -11,19 +11,18 @@ from iowbc.recipe.simulation.randomization import Distribution, Randomization
 from iowbc.recipe.simulation.scene import Scenes
 
 SCENES = tuple(Scenes.model_fields)
-"""Names of the scenes that every recipe has."""
+"""Names of the built-in scenes."""
 FREE = "free"
 """The scene without an object."""
 SWITCHES = ("impulse_scale", "push_scale", "noise_scale", "load_scale", "resistance_scale")
-"""Factors on impulses, pushes and sensor noise, on how far the object's mass may rise above the lower end of its range,
-and on a crate's rolling resistance (fifty times as much blocks it). One unless held at another value; zero switches
-off."""
+"""Factors on impulses, pushes, sensor noise, the width of the object's mass range above its lower end, and a crate's
+rolling resistance (a factor of fifty blocks it). 1 unless fixed at another value; 0 disables the quantity."""
 BY_AXIS = tuple(f"object_com_offset_{axis}" for axis in "xyz")
-"""The parts of the offset of the object's centre of mass, in its own frame."""
+"""Components of the offset of the object's centre of mass, in the object's frame."""
 
 
 def _drawn(section: type[Section]) -> Iterator[str]:
-    """Names of the fields of a section that are drawn."""
+    """Names of the randomized fields of a section."""
     return (name for name, field in section.model_fields.items() if field.annotation is Distribution)
 
 
@@ -36,7 +35,7 @@ HOLDABLE = (
     "object_mass",
     "partner_behaviour",
 )
-"""Names of what is drawn for an episode."""
+"""Names of all quantities that a trial may fix."""
 
 
 def _with_object(name: str) -> str:
@@ -53,7 +52,7 @@ def _known_quantities(held: dict[str, float]) -> dict[str, float]:
 
 
 def _behaviour_by_name(held: Any) -> Any:
-    """`partner_behaviour: leader` becomes its place in `BEHAVIOURS`."""
+    """Replace a behaviour's name, as in `partner_behaviour: leader`, by its index in `BEHAVIOURS`."""
     if not (isinstance(held, dict) and isinstance(name := held.get("partner_behaviour"), str)):
         return held
     if name not in BEHAVIOURS:
@@ -66,5 +65,5 @@ WITH_OBJECT = AfterValidator(_with_object)
 ObjectScene = Annotated[
     str, WITH_OBJECT, Field(json_schema_extra={"examples": [name for name in SCENES if name != FREE]})
 ]
-"""A scene with an object; which ones there are, the recipe says."""
+"""Name of a scene with an object; the recipe may define further ones."""
 Held = Annotated[dict[str, float], AfterValidator(_known_quantities), BeforeValidator(_behaviour_by_name)]

@@ -1,4 +1,4 @@
-"""Quantities that are drawn anew for each episode, and the disturbances within one; ranges of the paper's Table I."""
+"""Domain randomization: quantities drawn per episode, and disturbances within one; ranges of the paper's Table I."""
 
 from collections.abc import Iterator
 from typing import Literal
@@ -9,16 +9,16 @@ from iowbc.recipe.section import LATER, Interval, Section
 
 
 class Distribution(Interval):
-    """x ~ U(low, high), or its logarithm uniform; or else the nominal value."""
+    """Uniform or log-uniform distribution over [low, high], mixed with a nominal value."""
 
     nominal: float
-    """Value where the entry is disabled or not drawn."""
+    """Value if the entry is disabled or not drawn."""
     shape: Literal["uniform", "log-uniform"] = "uniform"
-    """Uniform between the ends, or uniform in the logarithm."""
+    """Uniform in the value, or in its logarithm."""
     probability: float = Field(default=1.0, ge=0.0, le=1.0)
-    """Chance that a value is drawn; otherwise it is the nominal one."""
+    """Probability that a value is drawn; otherwise it is the nominal one."""
     enabled: bool = True
-    """Off always gives the nominal value."""
+    """Enable the randomization; otherwise always the nominal value."""
 
     def problems(self) -> Iterator[tuple[str, str]]:
         yield from super().problems()
@@ -34,20 +34,20 @@ POSITIVE = ("link_mass_scale", "link_inertia_scale")
 
 
 class Randomization(Section):
-    """Quantities drawn once an episode."""
+    """Quantities drawn at the start of each episode."""
 
     enabled: bool = True
-    """Off gives every entry its nominal value."""
+    """Enable the randomization; otherwise every entry has its nominal value."""
     object_mass_scale: Distribution = Distribution(low=0.07, high=1.5, nominal=1.0)
-    """Object mass as a part of the nominal one: from 0.5 kg in the hands and a crate of 5 kg, the lightest loads of the
-    trials, to 150 %. Table I has 50 to 150 %."""
+    """Object mass relative to the nominal one: from a 0.5 kg box and a 5 kg crate, the lightest loads of the trials, to
+    150 %. Table I has 50 to 150 %."""
     light_share: float = Field(default=0.0, ge=0.0, le=1.0, json_schema_extra=LATER)
-    """Part of the episodes whose object is light: its mass is log-uniform between the lower end of `object_mass_scale`
-    and `light_end`. A range that begins at 0.05 kg and is drawn evenly has 4 % of its masses below 0.5 kg."""
+    """Fraction of the episodes with a light object, whose mass is log-uniform between the lower end of
+    `object_mass_scale` and `light_end`. A uniform range from 0.05 kg has only 4 % of its masses below 0.5 kg."""
     light_end: float = Field(default=0.1, gt=0.0, json_schema_extra=LATER)
-    """Heaviest light object as a part of the nominal mass: 0.7 kg in the hands, a crate of 6.5 kg."""
+    """Largest mass of a light object relative to the nominal one: 0.7 kg in the hands, a crate of 6.5 kg."""
     inertia_scale: Distribution = Distribution(low=0.8, high=1.2, nominal=1.0)
-    """Object inertia as a part of that of a uniform body of its mass."""
+    """Object inertia relative to that of a uniform body of its mass."""
     object_com_offset: Distribution = Distribution(low=-0.03, high=0.03, nominal=0.0)
     """Offset of the object's centre of mass from its centre, per axis [m]."""
     ground_friction: Distribution = Distribution(low=0.5, high=1.2, nominal=0.8)
@@ -57,44 +57,44 @@ class Randomization(Section):
     surface_friction: Distribution = Distribution(low=1.0, high=1.5, nominal=1.2)
     """Friction between palms and object (Table I)."""
     link_mass_scale: Distribution = Distribution(low=0.9, high=1.1, nominal=1.0)
-    """Mass of each link as a part of its nominal one; the inertia follows."""
+    """Mass of each link relative to its nominal one; the inertia scales with it."""
     link_inertia_scale: Distribution = Distribution(low=0.9, high=1.1, nominal=1.0)
     """Further factor on the inertia of each link."""
     joint_friction: Distribution = Distribution(low=0.0, high=0.3, nominal=0.0, probability=0.3)
-    """Dry friction of each joint [N·m]; in some episodes only, for its 29 constraint rows slow the physics by 15 %."""
+    """Dry friction of each joint [N·m]; only in some episodes: its 29 constraint rows slow the physics by 15 %."""
     motor_damping: Distribution = Distribution(low=0.0, high=0.5, nominal=0.0)
     """Viscous friction of each joint beyond the controller's own damping [N·m·s/rad]."""
     kp_scale: Distribution = Distribution(low=0.9, high=1.1, nominal=1.0)
-    """Position gain of each joint as a part of its nominal one."""
+    """Position gain of each joint relative to its nominal one."""
     kd_scale: Distribution = Distribution(low=0.9, high=1.1, nominal=1.0)
-    """Velocity gain of each joint as a part of its nominal one."""
+    """Velocity gain of each joint relative to its nominal one."""
     motor_strength: Distribution = Distribution(low=0.85, high=1.0, nominal=1.0)
-    """Torque limit of each joint as a part of its nominal one; batteries run down and motors warm up."""
+    """Torque limit of each joint relative to its nominal one; batteries run down and motors warm up."""
     linkage_effort: Distribution = Distribution(low=35.0, high=50.0, nominal=50.0)
-    """Torque that the two joints of a linkage (ankles, waist roll and pitch) have together at full motor strength
-    [N·m]; public sources give 35 and 50. The mean strength of the two motors scales it."""
+    """Joint torque limit of the two joints of a linkage (ankles, waist roll and pitch) at full motor strength [N·m];
+    public sources give 35 and 50. It is scaled by the mean strength of the two motors."""
     encoder_bias: Distribution = Distribution(low=-0.015, high=0.015, nominal=0.0)
-    """Constant error of each joint position sensor [rad]; the joint controllers take it for true, too."""
+    """Constant error of each joint position sensor [rad]; it affects the joint controllers, too."""
     imu_tilt: Distribution = Distribution(low=-0.03, high=0.03, nominal=0.0)
-    """Constant roll and pitch of the inertial unit against the base [rad]; two degrees of mounting and calibration."""
+    """Constant roll and pitch of the IMU relative to the base [rad]: two degrees from mounting and calibration."""
     heading_drift: Distribution = Distribution(low=-0.002, high=0.002, nominal=0.0)
-    """Drift of the heading that the inertial unit integrates [rad/s]: it knows its gyro's bias from standing still, and
-    errs by some degrees a minute. A skill layer with a view of the world would correct it."""
+    """Drift of the heading that the IMU integrates [rad/s]: with its gyro bias calibrated at rest, it drifts by some
+    degrees per minute. A skill layer with exteroception would correct it."""
     gyro_bias: Distribution = Distribution(low=-0.02, high=0.02, nominal=0.0)
     """Constant error of the measured angular velocity, per axis [rad/s]; a warm low-cost gyroscope drifts by this."""
     start_yaw: Distribution = Distribution(low=-3.141592653589793, high=3.141592653589793, nominal=0.0)
-    """Heading in which an episode begins, against the world's x axis [rad]; nothing may depend on it."""
+    """Initial heading relative to the world's x axis [rad]; behaviour must not depend on it."""
     action_latency: Distribution = Distribution(low=0.0, high=1.0, nominal=0.0)
     """Delay of the joint targets [control periods], to the nearest physics step."""
     sensor_latency: Distribution = Distribution(low=0.0, high=1.0, nominal=0.0)
     """Delay of joint and inertial measurements [control periods]."""
     slow_share: float = Field(default=0.0, ge=0.0, le=1.0, json_schema_extra=LATER)
-    """Part of the episodes in which action and sensor latency are both in the upper third of their ranges. Drawn
-    independently, one in nine has both, and robots that stand either of them fall with both."""
+    """Fraction of the episodes in which action and sensor latency are both in the upper third of their ranges. Drawn
+    independently, they are so in one episode of nine; robots that tolerate either of them fall with both."""
     object_latency: Distribution = Distribution(low=0.0, high=2.0, nominal=0.0)
     """Delay of the measured pose and rates of the object [control periods]."""
     longest_latency: int = Field(default=4, ge=1, le=100)
-    """Length of the delay lines [control periods]; no latency may pass it."""
+    """Length of the delay buffers [control periods]; no latency may exceed it."""
 
     def problems(self) -> Iterator[tuple[str, str]]:
         for name, values in self:
@@ -112,23 +112,23 @@ class Impulses(Section):
     """Random impulses on the object's centre of mass (paper III-D: I_rand)."""
 
     enabled: bool = True
-    """Off leaves the object alone."""
+    """Enable impulses on the object."""
     interval: Distribution = Distribution(low=1.5, high=4.0, nominal=3.0)
     """Time from one impulse to the next [s]."""
     magnitude: Distribution = Distribution(low=1.0, high=8.0, nominal=4.0)
-    """Size [N·s]; 8 N·s stop a 7 kg box that moves at 1.1 m/s."""
+    """Magnitude [N·s]; 8 N·s stop a 7 kg box that moves at 1.1 m/s."""
     duration: float = Field(default=0.1, gt=0.0)
-    """Time over which an impulse acts, as a constant force [s]."""
+    """Duration of an impulse, a constant force [s]."""
 
 
 class Pushes(Section):
     """Random pushes on the robot's base."""
 
     enabled: bool = True
-    """Off leaves the base alone."""
+    """Enable pushes on the base."""
     interval: Distribution = Distribution(low=2.0, high=5.0, nominal=4.0)
     """Time from one push to the next [s]."""
     speed: Distribution = Distribution(low=0.0, high=0.5, nominal=0.3)
-    """Change of the robot's velocity that a push would give it in the air, in a random horizontal direction [m/s]."""
+    """Velocity change that a push would give the free robot, in a random horizontal direction [m/s]."""
     duration: float = Field(default=0.1, gt=0.0)
-    """Time over which a push acts, as a constant force [s]."""
+    """Duration of a push, a constant force [s]."""

@@ -1,4 +1,4 @@
-"""The worlds that a robot can be put in: nothing, an object held between the wrists, a crate to push, one's own."""
+"""Scenes of the simulation: no object, an object held between the wrists, a crate to push, and custom scenes."""
 
 from collections.abc import Iterator
 from typing import Literal
@@ -15,64 +15,62 @@ class Grasp(Section):
     """Hold of the hands on an object."""
 
     kind: Literal["compliant", "contact"] = "compliant"
-    """A compliant connection that lets go above its slip force, or frictional squeeze between two palms."""
+    """`compliant`: an elastic connection that releases above its slip force; `contact`: friction between two palms."""
     time_constant: float = Field(default=0.02, gt=0.0)
     """Time constant of the compliant connection [s]; at least two physics steps, as for every soft constraint."""
     strength: float = Field(default=140.0, ge=0.0)
-    """Normal force of each hand that a compliant grasp stands for [N]; times the surface friction it is the force at
-    which the hand slips. At friction 1.0 two hands hold 28 kg; the tyre at 150 % weighs 27."""
+    """Equivalent normal force of each hand in a compliant grasp [N]; multiplied by the surface friction, it is the slip
+    force of the hand. At friction 1.0 two hands hold 28 kg; the tyre at 150 % weighs 27."""
     squeeze: float = Field(default=60.0, ge=0.0)
-    """Force with which the arms press each palm against an object held by contact [N]: motor torques beside the joint
-    control. At friction 1.0 it holds 9.5 kg and takes 15 of the 25 N·m at the shoulders."""
+    """Force with which the arms press each palm against an object held by contact [N], from motor torques added to the
+    joint control. At friction 1.0 it holds 9.5 kg and takes 15 of the 25 N·m at the shoulders."""
     by_friction: float = Field(default=1.0, ge=0.0, le=1.0)
-    """Part of what a hand bears in a compliant grasp for which the palm has to press, with load / friction, at the cost
-    of the arms' motors; the rest lies on fingers beneath."""
+    """Fraction of a hand's load in a compliant grasp that friction bears. For it the palm presses with load / friction,
+    which loads the arms' motors; fingers beneath the object bear the rest."""
     stiffness: float = Field(default=4.0, ge=0.0)
-    """Stiffness with which the palms resist turning of the object about the line between them [N·m/rad]; so soft that a
-    box still hangs and wrists of 5 N·m bear what a tilt of the hands costs, yet it bears what a second carrier leaves
-    unbalanced."""
+    """Stiffness with which the palms resist rotation of the object about the line between them [N·m/rad]. It is low
+    enough that a box still hangs and that 5 N·m wrists bear the torque of tilted hands, and high enough to bear the
+    imbalance that a partner leaves."""
     torsion: float = Field(default=0.02, ge=0.0, json_schema_extra=LATER)
-    """Torque at which a palm slips about the line between the hands, over the force at which it slips [m]: two thirds
-    of the radius of a 3 cm contact patch. Two hands of a compliant grasp bear 5.6 N·m at friction 1.0."""
+    """Ratio of a palm's slip torque about the line between the hands to its slip force [m]: two thirds of the radius of
+    a 3 cm contact patch. Two hands of a compliant grasp bear 5.6 N·m at friction 1.0."""
     stability: float = Field(default=0.3, gt=0.0, le=1.0)
-    """Bound on that stiffness · period² / inertia, and on damping · period / inertia, above which a torque that is held
-    over a control period would make a light object oscillate."""
+    """Bound on that stiffness · period² / inertia, and on damping · period / inertia. Above it, a torque held over a
+    control period would make a light object oscillate."""
     near_end: float = Field(default=0.8, ge=0.0, le=1.0)
-    """Part of the way from the middle to the near end up to which the grips of an object carried by two are placed, so
-    that the lever arms share the weight as the carriers do."""
+    """Farthest position of the grips of an object carried by two, as a fraction of the way from its middle to its near
+    end. The position makes the lever arms match the carriers' shares of the weight."""
     height: float = 0.08
     """Height of the grips above the object's centre [m]; above the centre of mass, so that the object hangs stably."""
     settling: int = Field(default=5, ge=0, le=1000)
-    """Iterations in each physics step that take the creep out of a grasp by contact (MuJoCo's noslip solver, with the
-    elliptic friction cone)."""
+    """Iterations of MuJoCo's noslip solver in each physics step, with the elliptic friction cone; they remove the creep
+    of a grasp by contact."""
     handover: float = Field(default=0.5, ge=0.0)
-    """Time over which an object's weight comes to bear at the start of an episode [s]; dropped into the hands at once,
-    it would pull with twice its weight."""
+    """Ramp of the object's weight at the start of an episode [s]; a sudden load would pull with twice the weight."""
     swing_damping: float = Field(default=3.0, ge=0.0)
-    """Rate at which the palms damp the object's turning against the hands [1/s]; a box on two points swings at
-    1.0 Hz."""
+    """Damping rate of the object's rotation relative to the hands [1/s]; a box on two points swings at 1.0 Hz."""
 
 
 class Object(Section):
     """A rigid object, uniform at its nominal mass."""
 
     shape: Literal["box", "tyre", "cylinder", "mesh"]
-    """A box; a ring that stands across the robot's way, so that the hands hold its rim on both sides; an upright
-    cylinder; or a file's triangles, of which the convex hull touches and has the inertia."""
+    """`box`; `tyre`: a ring that stands across the robot's path, so that the hands hold its rim on both sides;
+    `cylinder`: upright; `mesh`: triangles of a file, whose convex hull determines contact and inertia."""
     size: Size | None = None
-    """Extent along x (forward), y (left) and z (up) [m]; empty for a mesh, which has that of its file."""
+    """Extent along x (forward), y (left) and z (up) [m]; empty for a mesh, whose size is that of its file."""
     mass: float = Field(gt=0.0)
     """Nominal mass [kg]."""
     smallest_mass: float = Field(default=0.05, gt=0.0)
-    """Lighter masses, zero too, are simulated as this [kg]: a free body needs inertia."""
+    """Smallest simulated mass [kg]; smaller ones, including zero, are raised to it: a free body needs inertia."""
     smallest_inertia: float = Field(default=0.5, gt=0.0, json_schema_extra=LATER)
-    """Lighter objects weigh what they weigh and move with the inertia of this mass [kg]. Forces of grip and partner are
-    held over a control period; on a light free body they would have to be so soft (`stability`) that a box of 0.05 kg
+    """Mass whose inertia lighter objects have [kg]; their weight stays their own. Forces of grip and partner are held
+    over a control period; on a body with less inertia they would have to be so soft (`stability`) that a 0.05 kg box
     turned over between its carriers."""
     mesh: MeshFile | None = Field(default=None, json_schema_extra=LATER)
     """An .obj or .stl file beside the recipe, x forward and z up."""
     scale: float = Field(default=1.0, gt=0.0, json_schema_extra=LATER)
-    """Metres for a unit of the mesh: 0.001 for a file in millimetres."""
+    """Metres per unit of the mesh: 0.001 for a file in millimetres."""
 
     def problems(self) -> Iterator[tuple[str, str]]:
         if (self.shape == "mesh") != (self.mesh is not None):
@@ -87,24 +85,25 @@ class Object(Section):
 
 
 class Scene(Section):
-    """A world."""
+    """Scene of an episode: the object and how it is handled."""
 
     kind: Literal["free", "lift", "push"]
-    """No object; one held between the wrists; a crate on omnidirectional wheels before the hands."""
+    """`free`: no object; `lift`: one held between the wrists; `push`: a crate on omnidirectional wheels."""
     object: Object | None = None
-    """The object; none in a free scene."""
+    """The object; empty in a free scene."""
     grasp: Grasp = Grasp()
     """Hold on the object in a lift scene."""
     palm: tuple[float, float, float] = (0.0, -0.03, 0.0)
-    """Place where the left palm touches an object, from the grip in the hand's frame [m]; the right one mirrors it."""
+    """Contact point of the left palm relative to the grip, in the hand's frame [m]; the right palm mirrors it."""
     gap: float = Field(default=0.01, ge=0.0)
     """Distance from the palms to the crate's face at the start of a push [m]."""
     palm_radius: float = Field(default=0.03, gt=0.0)
     """Radius of the spheres with which palms touch an object [m]."""
     yaw_arm: float = Field(default=0.3, gt=0.0)
-    """Mean distance of the crate's wheels from its centre [m]; times the rolling resistance it resists turning."""
+    """Mean distance of the crate's wheels from its centre [m]. Multiplied by the rolling resistance, it is the torque
+    that resists turning."""
     creep: float = Field(default=0.02, gt=0.0)
-    """Speed below which a crate counts as at rest [m/s]; stuck, the solver lets it creep at 1 mm/s."""
+    """Speed below which a crate counts as at rest [m/s]; the solver lets a stuck crate creep at 1 mm/s."""
 
     def problems(self) -> Iterator[tuple[str, str]]:
         if (self.kind == "free") != (self.object is None):
@@ -115,7 +114,7 @@ class Scene(Section):
 
 
 class Scenes(NamedEntries):
-    """The scenes by name; a recipe may add its own, with `task.references.grasps` and `.loads` of the same name."""
+    """Scenes by name. A recipe may add custom scenes, with `task.references.grasps` and `.loads` of the same name."""
 
     __pydantic_extra__: dict[str, Scene] = Field(init=False)
     free: Scene = Scene(kind="free")

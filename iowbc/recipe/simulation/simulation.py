@@ -1,4 +1,4 @@
-"""The world: physics, scenes, partner, randomisation, sensing."""
+"""Simulation settings: physics, scenes, partner, randomization, sensing."""
 
 from typing import Literal
 
@@ -11,10 +11,10 @@ from iowbc.recipe.simulation.scene import Scenes
 
 
 class SensorNoise(Section):
-    """White noise per measurement, standard deviations; biases and latencies are in `randomization`."""
+    """Standard deviations of white measurement noise; biases and latencies are in `randomization`."""
 
     enabled: bool = True
-    """Off measures the truth, but for bias and latency."""
+    """Enable white noise; bias and latency are independent of it."""
     joint_position: float = Field(default=0.01, ge=0.0)
     """Joint positions [rad]."""
     joint_velocity: float = Field(default=0.5, ge=0.0)
@@ -39,29 +39,29 @@ class Physics(Section):
     """Integration by MuJoCo."""
 
     timestep: float = Field(default=0.005, gt=0.0, le=0.02)
-    """Physics step [s]; a whole number of them makes a control period."""
+    """Physics step [s]; the control period must be a multiple of it."""
     pd: Literal["implicit", "explicit"] = "implicit"
-    """Damping of the joint controllers: integrated implicitly (stable at any gain) or, as on the robot,
-    computed explicitly from the measured state at the physics rate; then the step must be short enough, 2 ms here."""
+    """Damping of the joint controllers: integrated implicitly (stable at any gain) or, as on the robot, computed
+    explicitly from the measured state at the physics rate, which requires a short step (2 ms here)."""
     torque_corner: float = Field(default=0.6, ge=0.0, lt=1.0)
-    """Part of the no-load speed up to which a motor gives its full torque; beyond, it falls to nothing in a line.
-    An assumption, not a measured curve."""
+    """Fraction of the no-load speed up to which a motor gives its full torque; beyond it, the torque falls linearly to
+    zero. An assumption, not a measured curve."""
     cone: Literal["pyramidal", "elliptic"] = "pyramidal"
-    """Friction cone: the pyramid inscribed in it, or the cone itself, which costs a tenth more."""
+    """Friction cone: an inscribed pyramid, or the exact elliptic cone at 10 % more computing time."""
     solver: Literal["newton", "cg"] = "newton"
     """Constraint solver."""
     iterations: int = Field(default=10, ge=1, le=10_000)
-    """Solver iterations at most. Ten give the trajectories of a hundred to machine precision at no cost, for the solver
-    stops when it has converged; at five, joints are off by 0.1 rad after half a second."""
+    """Largest number of solver iterations. Ten give the trajectories of a hundred to machine precision at no cost,
+    because the solver stops at convergence; with five, joints are off by 0.1 rad after half a second."""
     line_search_iterations: int = Field(default=20, ge=1, le=10_000)
-    """Line search iterations at most; as above."""
+    """Largest number of line search iterations; the line search also stops at convergence."""
     body_contact: Literal["nothing", "object", "everything"] = "object"
-    """Bodies that links other than soles and palms touch. Where they touch nothing, a held box sinks 4 cm into thighs
-    and torso; self-collisions and falls on hands and knees need everything. docs/simulation.md has the costs."""
+    """Bodies that collide with links other than soles and palms. With `nothing`, a held box sinks 4 cm into thighs and
+    torso; self-collisions and falls on hands and knees need `everything`. docs/simulation.md lists the costs."""
     leg_contact: bool = True
-    """Lets the legs, feet included, touch each other; off, feet pass through each other and steps may cross."""
+    """Enable collisions between the legs, feet included; otherwise feet pass through each other and steps may cross."""
     contact_force: float = Field(default=1.0, gt=0.0)
-    """Force above which a foot counts as being on the ground, and a palm as touching an object [N]."""
+    """Smallest contact force of a foot on the ground, or of a palm on an object, that counts as contact [N]."""
     fastest: float = Field(default=200.0, gt=0.0)
     """Speed above which a simulation counts as diverged [m/s, rad/s]; the fastest joint reaches 37 rad/s."""
     divergences_kept: int = Field(default=8, ge=0, le=1000, json_schema_extra=COSMETIC)
@@ -69,19 +69,19 @@ class Physics(Section):
 
 
 class SimulationSettings(Section):
-    """The world: physics, scenes, partner, randomisation, sensing."""
+    """Simulation settings: physics, scenes, partner, randomization, sensing."""
 
     physics: Physics = Physics()
     """Integration by MuJoCo."""
     scenes: Scenes = Scenes()
-    """The worlds by name."""
+    """Scenes by name."""
     partner: PartnerSettings = PartnerSettings()
-    """The second carrier."""
+    """The partner at the object's far handle."""
     randomization: Randomization = Randomization()
-    """Quantities that are drawn anew for each episode."""
+    """Domain randomization: quantities drawn at the start of each episode."""
     impulses: Impulses = Impulses()
     """Impulses on the object's centre of mass."""
     pushes: Pushes = Pushes()
     """Pushes on the base."""
     sensing: SensorNoise = SensorNoise()
-    """Errors that the sensors add to the truth."""
+    """Measurement noise of the sensors."""

@@ -12,31 +12,31 @@ Range = tuple[float, float]
 
 
 class Stretch(Section):
-    """A stretch of a path: an arc of constant curvature, or a straight line."""
+    """Segment of a path: an arc of constant curvature, or a straight line."""
 
     length: float = Field(gt=0.0, le=50.0)
     """Length [m]."""
     turn: float = Field(default=0.0, ge=-math.pi, le=math.pi)
-    """Change of the path's heading over the stretch, positive to the left [rad]."""
+    """Change of the path's heading over the segment, positive to the left [rad]."""
     rise: float = Field(default=0.0, ge=-0.5, le=0.5)
-    """Change of the object's height over the stretch [m]."""
+    """Change of the object's height over the segment [m]."""
     width: float | None = Field(default=None, gt=0.0)
-    """Distance of the walls on both sides [m]; empty where there are none."""
+    """Distance between the walls on both sides [m]; empty: no walls."""
 
 
 class TransportTask(Section):
     """An object, its load, and the path on which it is to be transported."""
 
     scene: ObjectScene
-    """Scene in which it is played, one with an object."""
+    """Scene of the task, with an object."""
     path: tuple[Stretch, ...] = Field(min_length=1, max_length=64)
-    """Stretches in order, from the object's centre at the start, along the robot's heading."""
+    """Segments in order, from the object's centre at the start, along the robot's heading."""
     mass: Range
-    """Range of the object's mass [kg]; so heavy that the robot cannot do it alone."""
+    """Range of the object's mass [kg]; too heavy for the robot alone."""
     share: Range = (0.4, 0.6)
     """Range of the human's share of the weight, or in a push of the rolling resistance."""
     rolling_resistance: float | None = Field(default=None, ge=0.0)
-    """Rolling resistance as a fraction of the weight, in a push; empty draws it as training does."""
+    """Rolling resistance as a fraction of the weight, in a push; empty: drawn as in training."""
     duration: float = Field(gt=0.0, le=600.0)
     """Time limit [s]."""
     weight: float = Field(default=1.0, ge=0.0)
@@ -77,19 +77,19 @@ VERTICAL = (
 
 
 def _push(path: tuple[Stretch, ...], duration: float) -> TransportTask:
-    """A push of the paper's crate on wheels that resist more than the robot alone overcomes."""
+    """A push of the paper's crate, with a rolling resistance that the robot alone cannot overcome."""
     return TransportTask(
         scene="push", path=path, mass=(60.0, 70.0), share=(0.3, 0.45), rolling_resistance=0.16, duration=duration
     )
 
 
 def _lift(path: tuple[Stretch, ...], duration: float) -> TransportTask:
-    """A box of twice what the robot alone carries."""
+    """A box of twice the mass that the robot alone carries."""
     return TransportTask(scene="lift", path=path, mass=(12.0, 15.0), duration=duration)
 
 
 class Tasks(NamedEntries):
-    """Transport tasks by name; those of the paper, and a recipe's own beside them."""
+    """Transport tasks by name: those of the paper and custom ones."""
 
     __pydantic_extra__: dict[str, TransportTask] = Field(init=False)
     push_straight: TransportTask = _push(STRAIGHT, 25.0)

@@ -39,7 +39,7 @@ class Commands(Section):
     """Ranges, resampling and limits of the command [v_x, v_y, ω_yaw, H, α_pitch, Δp_left, Δp_right]."""
 
     velocity_x: Range = (-0.3, 0.6)
-    """Forward velocity, heading frame [m/s]; a little beyond the 0.5 m/s that trials ask for."""
+    """Forward velocity, heading frame [m/s]; slightly beyond the 0.5 m/s of the trials."""
     velocity_y: Range = (-0.2, 0.2)
     """Velocity to the left, heading frame [m/s]."""
     yaw_rate: Range = (-0.4, 0.4)
@@ -51,37 +51,37 @@ class Commands(Section):
     deep_pitch: Range = (-0.5, 1.5)
     """Torso pitch of the deep leans, the paper's whole range [rad]; while standing, clamped by the feasible map."""
     deep_share: float = Field(default=0.1, ge=0.0, le=1.0)
-    """Part of the commands that lean deeply; few, for trials stay within `pitch`."""
+    """Fraction of the commands with a deep lean; few, since trials stay within `pitch`."""
     pushing: PushingVelocities = PushingVelocities()
     """Velocities in a scene with a crate to push."""
     common_offset: Vector = (0.05, 0.05, 0.08)
-    """Largest offset that both wrists share, per axis of the heading frame [m]."""
+    """Largest common offset of both wrists, per axis of the heading frame [m]."""
     single_offset: Vector = (0.02, 0.0, 0.02)
-    """Largest further offset of one wrist alone, per axis [m]; small, because a held object does not stretch."""
+    """Largest additional offset of a single wrist, per axis [m]; small, because a held object does not stretch."""
     nominal_height: float = Field(default=0.72, gt=0.0)
-    """Height of the nominal posture [m], taken when a command leaves the posture alone."""
+    """Height of the nominal posture [m], used for commands that leave the posture unspecified."""
     nominal_pitch: float = 0.0
     """Torso pitch of the nominal posture [rad]."""
     standing_episodes: float = Field(default=0.1, ge=0.0, le=1.0)
-    """Part of the episodes that never walk: there balance, posture and loads are practised while walking is not learnt
-    yet; 1 trains standing alone."""
+    """Fraction of the episodes without walking. They train balance, posture and loads before walking is learnt; 1:
+    standing only."""
     standing_share: float = Field(default=0.15, ge=0.0, le=1.0)
-    """Part of the commands of the other episodes that ask for standing still, so that three in four of all walk.
-    With two in four a robot learnt to step in place, and stayed there."""
+    """Fraction of standing commands in the other episodes, so that three in four of all commands walk. With two in four
+    a robot learnt to step in place and never walked."""
     straight_share: float = Field(default=0.5, ge=0.0, le=1.0)
-    """Part of the walking commands without yaw rate and lateral velocity."""
+    """Fraction of the walking commands without yaw rate and lateral velocity."""
     turning_share: float = Field(default=0.1, ge=0.0, le=1.0)
-    """Part of the commands with a yaw rate that turn on the spot."""
+    """Fraction of the commands with a yaw rate that turn on the spot."""
     nominal_share: float = Field(default=0.4, ge=0.0, le=1.0)
-    """Part of the commands with nominal height, pitch and wrists."""
+    """Fraction of the commands with nominal height, pitch and wrists."""
     holding_start: float = Field(default=0.3, ge=0.0, le=1.0)
-    """Part of a drawn posture's distance from the nominal one at which an episode with a held object begins; at 1 a
-    third of the objects would begin inside thighs or torso. The command then approaches the drawn posture."""
+    """Initial posture of an episode with a held object, as a fraction of the way from the nominal to the drawn posture;
+    at 1 a third of the objects would start inside thighs or torso. The command then approaches the drawn posture."""
     smallest_speed: float = Field(default=0.25, ge=0.0)
-    """Planar speed [m/s] under which a drawn walking velocity is lengthened, out of its range if need be, so that
-    walking is worth a step."""
+    """Smallest planar speed of a walking command [m/s]. Slower ones are raised to it, even out of their range, so that
+    stepping is worthwhile."""
     smallest_yaw_rate: float = Field(default=0.2, ge=0.0)
-    """Yaw rate [rad/s] under which a turn on the spot is quickened, for the same reason."""
+    """Smallest yaw rate of a turn on the spot [rad/s]; slower ones are raised to it, for the same reason."""
     resampling: Range = (3.0, 7.0)
     """Time from one command to the next [s]."""
     rates: CommandRates = CommandRates()

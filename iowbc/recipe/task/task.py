@@ -1,4 +1,4 @@
-"""The Markov decision process: action, observation, termination, and the sections of the other files."""
+"""The Markov decision process: action, observation, termination, and the sections in the other files."""
 
 from collections.abc import Iterator
 from typing import Annotated, Literal, Self
@@ -17,65 +17,65 @@ class Action(Section):
     """The residual action: joint position increments of the 15 support joints."""
 
     scale: float | None = Field(default=None, gt=0.0)
-    """Radians of joint target per unit of action, for every joint; empty takes each joint's scale from `robot.yaml`."""
+    """Radians of joint target per unit of action, for every joint; empty: each joint's scale from `robot.yaml`."""
     bound: float = Field(default=5.0, gt=0.0)
     """Actions are clipped to plus and minus this, in units of action."""
 
 
 class OwnPart(OwnFunction):
-    """A part of s_priv that is a function in a file of one's own. It takes the `Truth` (iowbc/task/privileged.py) of n
+    """Custom part of s_priv: a function in a user's file. It takes the `Truth` (iowbc/task/privileged.py) of n
     environments and returns k values for each, (n, k)."""
 
     mirror: tuple[Literal[-1, 1], ...] = Field(min_length=1, max_length=256)
-    """Signs of the k values when left and right change places, (k,): −1 where a value changes its sign, as a vector's
-    lateral component, a roll or a yaw does; 1 where it does not. Of a left and a right value give the mean, whose sign
-    is 1, and the difference, whose sign is −1."""
+    """Signs of the k values under left-right mirroring, (k,): −1 for a value that changes its sign, such as a lateral
+    component, roll or yaw; otherwise 1. Replace left and right values by their mean (sign 1) and difference (−1)."""
 
 
 class Observation(Section):
     """Observations of policy and teacher."""
 
     observe_object: bool = True
-    """Puts into s_t the object's pose and rates in the base frame (eq. 5); otherwise teacher and student have
-    proprioception alone. `distill.observe_object` is for the student."""
+    """Include the object's pose and rates in the base frame in s_t (eq. 5); otherwise teacher and student have
+    proprioception only. `distill.observe_object` sets it for the student."""
     own: dict[OwnName, OwnPart] = Field(default_factory=dict, json_schema_extra=LATER)
-    """Parts of s_priv of one's own, by name; only what trains or plays a policy that sees s_priv executes them."""
+    """Custom parts of s_priv by name; they are executed only to train or run a policy that observes s_priv."""
 
 
 class Termination(Section):
-    """When an episode ends early, and what counts as a fall or a drop in evaluation."""
+    """Conditions of early termination, and of a fall or a drop in evaluation."""
 
     pelvis_height: float = Field(default=0.3, ge=0.0)
-    """Pelvis below this is a fall [m]."""
+    """Height of the pelvis below which the robot has fallen [m]."""
     pelvis_tilt: float = Field(default=1.3, gt=0.0)
-    """Pelvis further than this from upright is a fall [rad]; wide, because deep torso pitch tilts the pelvis too."""
+    """Tilt of the pelvis beyond which the robot has fallen [rad]; large, since deep torso pitch tilts it too."""
     torso_roll: float = Field(default=0.8, gt=0.0)
-    """Torso rolled further than this is a fall [rad]."""
+    """Torso roll beyond which the robot has fallen [rad]."""
     torso_pitch_error: float = Field(default=0.9, gt=0.0)
-    """Torso pitch further than this from its command is a fall [rad]."""
+    """Torso pitch error beyond which the robot has fallen [rad]."""
     lag: float | None = Field(default=None, gt=0.0)
-    """An episode ends when robot and object are this far behind the command [m], forgotten with the time constant
-    `lag_time`; empty never ends one. It costs like a fall, so that standing is no safe answer to a command to walk.
-    Nothing that the policy observes shows the lag; with 0.5 m walking was learnt later.
-    Only where the command can be followed: not in a push, not above level 1 of locomotion, not in trials."""
+    """Lag of robot and object behind the command that ends an episode [m]; it decays with the time constant `lag_time`.
+    Empty: no limit. The end costs as much as a fall, so that standing is no safe response to a walking command. The lag
+    cannot be observed by the policy; with 0.5 m walking was learnt later. It applies only if the command is feasible:
+    not in a push, above level 1 of locomotion, or in trials."""
     lag_time: float = Field(default=3.0, gt=0.0)
-    """Time in which a lag is forgotten [s]: at 0.4 m/s a robot may stand in place for 1.6 s, and three fifths of the
-    commanded speed are never too slow."""
+    """Time constant of the lag's decay [s]. At 0.4 m/s a robot may stand for 1.6 s, and three fifths of the commanded
+    speed are always sufficient."""
     heading_error: float | None = Field(default=1.2, gt=0.0)
-    """An episode ends when the heading is this far from the integrated command [rad]; where, and empty, as above."""
+    """Heading error against the integrated command that ends an episode [rad]; conditions as for `lag`. Empty: no
+    limit."""
     object_distance: float = Field(default=0.35, gt=0.0)
-    """A held object further than this from its place in the grasp is dropped [m]."""
+    """Distance of a held object from its place in the grasp beyond which it counts as dropped [m]."""
     object_beside: float | None = Field(default=None, gt=0.0, json_schema_extra=LATER)
-    """A pushed object further than this to the side of the hands is dropped [m]; empty never drops one. Only in
-    training: a robot that goes on beside a lost crate learns nothing of pushing."""
+    """Lateral distance of a pushed object from the hands beyond which it counts as dropped [m]; empty: no limit. It
+    applies only in training, since a robot that walks on beside a lost crate does not learn to push."""
 
 
 class SceneShares(NamedEntries):
-    """Part of the environments that plays each scene of `simulation.scenes`; only the proportions matter."""
+    """Fraction of the environments with each scene of `simulation.scenes`; only the proportions matter."""
 
     __pydantic_extra__: dict[str, Annotated[float, Field(ge=0.0)]] = Field(init=False)
     free: float = Field(default=0.1, ge=0.0)
-    """No object: walking, standing and posture alone."""
+    """No object: only walking, standing and posture."""
     lift: float = Field(default=0.9, ge=0.0)
     """The box, held between the wrists."""
     squeeze: float = Field(default=0.0, ge=0.0)
@@ -101,13 +101,13 @@ class Task(Section):
     control_frequency: float = Field(default=50.0, gt=0.0, le=500.0)
     """Rate at which the policy acts [Hz]; must divide the physics rate."""
     episode_duration: tuple[float, float] = (10.0, 20.0)
-    """Range from which the time limit of an episode is drawn [s]; a spread keeps environments out of step."""
+    """Range of the random time limit of an episode [s]; a spread desynchronizes the environments."""
     scenes: SceneShares = SceneShares()
-    """Scenes that the environments play."""
+    """Scenes of the environments."""
     commands: Commands = Commands()
-    """The 11-D skill-level command and how it is drawn."""
+    """The 11-D skill-level command and its sampling."""
     references: References = References()
-    """Joint references that follow from a command: base grasp, arm kinematics, reference generator, gait prior."""
+    """Joint references computed from a command: base grasp, arm kinematics, reference generator, gait prior."""
     action: Action = Action()
     """The residual action."""
     observation: Observation = Observation()
@@ -115,6 +115,6 @@ class Task(Section):
     reward: Reward = Reward()
     """Terms and weights of the reward."""
     termination: Termination = Termination()
-    """When an episode ends early."""
+    """Conditions of early termination."""
     curriculum: Curriculum = Curriculum()
     """The three phases of training."""
