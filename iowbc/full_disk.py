@@ -14,7 +14,7 @@ ROOM = 100_000
 """Free bytes below which a disk counts as full."""
 
 
-def nothing_fits(error: BaseException) -> bool:
+def is_disk_full(error: BaseException) -> bool:
     """True if an error, or one in its chain of causes, means that nothing more can be written."""
     return any(
         (isinstance(found, OSError) and found.errno in FULL) or any(text in str(found) for text in TEXTS)

@@ -96,14 +96,14 @@ class Adapter:
         return np.concatenate(past, axis=2).reshape(rows, -1)
 
 
-def require_fitting(adapter: Adapter, robot: Robot, frequency: float, where: str, *, moves_arms: bool = False) -> None:
+def validate_adapter(adapter: Adapter, robot: Robot, frequency: float, where: str, *, moves_arms: bool = False) -> None:
     """Check an adapter against a robot and a control rate [Hz], and its network against its observation.
     `moves_arms`: the controller acts on all arm joints, too.
 
     Raises StageFailed with the field, its value and the valid values.
     """
     problems = [
-        *_naming(adapter, robot, moves_arms),
+        *_joint_name_problems(adapter, robot, moves_arms),
         *(
             f"{name}: has shape {np.shape(values)}, expected {(len(names),)} finite numbers"
             for name, values, names in (
@@ -125,10 +125,10 @@ def require_fitting(adapter: Adapter, robot: Robot, frequency: float, where: str
         problems.append(f"ranges: {', '.join(unknown)}: no such velocity; valid: {', '.join(VELOCITIES)}")
     if problems:
         raise StageFailed(f"{where}: does not fit the robot {robot.name}: {'; '.join(problems)}")
-    _require_answer(adapter, where)
+    _check_network_output(adapter, where)
 
 
-def _naming(adapter: Adapter, robot: Robot, moves_arms: bool) -> list[str]:
+def _joint_name_problems(adapter: Adapter, robot: Robot, moves_arms: bool) -> list[str]:
     found = []
     for field, names, known in (("joints", adapter.joints, robot.joints), ("acted", adapter.acted, adapter.joints)):
         unknown = [name for name in names if name not in known]
@@ -140,7 +140,7 @@ def _naming(adapter: Adapter, robot: Robot, moves_arms: bool) -> list[str]:
     return [*found, f"acted: lacks {missing}{remedy}"] if missing else found
 
 
-def _require_answer(adapter: Adapter, where: str) -> None:
+def _check_network_output(adapter: Adapter, where: str) -> None:
     """Check the network's output for a robot that stands in the default posture."""
     try:
         parts = [np.asarray(term(standing(adapter)), np.float64)[:, None] for term in adapter.terms]

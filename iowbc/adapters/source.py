@@ -12,10 +12,10 @@ import numpy as np
 import yaml
 
 from iowbc.adapters import deploy, holosoma
-from iowbc.adapters.adapter import Adapter, require_fitting
+from iowbc.adapters.adapter import Adapter, validate_adapter
 from iowbc.errors import StageFailed
 from iowbc.files import file_digest
-from iowbc.recipe.beside import OwnFunction
+from iowbc.recipe.beside import CustomFunction
 from iowbc.recipe.evaluation.public_controller import PublicController
 from iowbc.recipe.task.task import Task
 from iowbc.robot.description import DESCRIPTION, Robot, kind_of, side_sign
@@ -38,7 +38,7 @@ def load_adapter(controller: PublicController) -> Adapter:
         raise StageFailed(f"{PLACE}.policy: {policy}: {text}; correct {PLACE}.sha256 if this is the file you mean")
     if controller.module is None:
         return SHIPPED[controller.adapter](policy)
-    own = load_function(f"{PLACE}.module", OwnFunction(module=controller.module, function="adapter"), CONTRACT)
+    own = load_function(f"{PLACE}.module", CustomFunction(module=controller.module, function="adapter"), CONTRACT)
     try:
         made = own.function(policy)
     except StageFailed:
@@ -54,7 +54,7 @@ def adapted_robot(controller: PublicController, robot: Robot, task: Task) -> Pat
     """Folder with a robot description that has the controller's gains and default posture. Raises StageFailed if the
     controller cannot be used or does not fit the robot."""
     adapter = load_adapter(controller)
-    require_fitting(adapter, robot, task.control_frequency, PLACE, moves_arms=controller.moves_arms)
+    validate_adapter(adapter, robot, task.control_frequency, PLACE, moves_arms=controller.moves_arms)
     return robot_of(adapter, robot, PLACE, moves_arms=controller.moves_arms)
 
 

@@ -37,7 +37,7 @@ class Stopwatch:
         setattr(owner, name, timed)
 
 
-class _Timed:
+class _BatchWrapper:
     """Wrapper of MuJoCo's batch, which does not accept attributes."""
 
     def __init__(self, batch: Any) -> None:
@@ -56,7 +56,7 @@ def step_breakdown(setup: Setup, periods: int, rounds: int) -> dict[str, float]:
     batch, watch = workers.batch, Stopwatch()
     watch.watch(batch, "step", "step")
     for world in batch.simulation.worlds:
-        world.batch = _Timed(world.batch)
+        world.batch = _BatchWrapper(world.batch)
         watch.watch(world.batch, "step", "physics")
         watch.watch(world.batch, "forward", "physics")
     watch.watch(batch.simulation, "step", "simulation")

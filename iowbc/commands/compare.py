@@ -70,7 +70,7 @@ def compare(
     missing = [name for name in members if name not in {run.label for run in tried}]
     _report_probes(found, output)
     if len(tried) > 1 or (tried and members):
-        report_together(tried, output, missing)
+        report_joint(tried, output, missing)
     if film:
         if len(tried) < 2:
             raise UsageError("--film shows evaluated runs side by side: two or more must have finished the stage eval")
@@ -146,7 +146,7 @@ def _joined(store: Store, found: Sequence[Run]) -> tuple[list[Table], dict[str, 
         output, tried = Path(folder), _having(found, TRIALS)
         _report_probes(found, output)
         if len(tried) > 1:
-            report_together(tried, output)
+            report_joint(tried, output)
         film = film_of(store.runs, [run.label for run in found])
         media = [*sorted((output / "figures").glob("*.png")), *([film] if film else [])]
         return read_tables(output / "tables"), {path.name: path.read_bytes() for path in media}
@@ -190,7 +190,9 @@ def _having(runs: Sequence[Run], name: str) -> list[Run]:
     return [run for run in runs if "eval" in run.artifacts and (run.artifacts["eval"].folder / name).is_file()]
 
 
-def _told_apart(runs: Sequence[Run], name: str, together: bool = True) -> "tuple[list[pd.DataFrame], dict[str, str]]":
+def _with_unique_labels(
+    runs: Sequence[Run], name: str, together: bool = True
+) -> "tuple[list[pd.DataFrame], dict[str, str]]":
     """A table of each run's evaluation with unambiguous variant names, and the original labels of renamed variants.
 
     Runs that differ only in their seed are trainings of one variant, unless `together` is false. A variant whose label
@@ -219,10 +221,10 @@ def _report_probes(found: Sequence[Run], output: Path) -> None:
     from iowbc.evaluation.report.probe import write_probe
 
     if runs := _having(found, PROBE):
-        write_probe(pd.concat(_told_apart(runs, PROBE, together=False)[0], ignore_index=True), output)
+        write_probe(pd.concat(_with_unique_labels(runs, PROBE, together=False)[0], ignore_index=True), output)
 
 
-def report_together(runs: Sequence[Run], output: Path, missing: Sequence[str] = ()) -> None:
+def report_joint(runs: Sequence[Run], output: Path, missing: Sequence[str] = ()) -> None:
     """Write tables and figures over all trials of the runs under `output`.
 
     missing: recipes that belong to them and have not run. Raises `UsageError` where the runs count masses differently.
@@ -231,7 +233,7 @@ def report_together(runs: Sequence[Run], output: Path, missing: Sequence[str] = 
 
     from iowbc.evaluation.report.report import write_report
 
-    trials, labels = _told_apart(runs, TRIALS)
+    trials, labels = _with_unique_labels(runs, TRIALS)
     rates = {run.artifacts["eval"].recipe["eval"]["success"]["capacity_rate"] for run in runs}
     if len(rates) > 1:
         raise UsageError(
@@ -276,7 +278,7 @@ def _steps_of(run: Run, stage: str) -> int | None:
     return int(made)
 
 
-def film_together(store: Store, console: Console, words: Sequence[str], output: Path) -> Path | None:
+def film_joint(store: Store, console: Console, words: Sequence[str], output: Path) -> Path | None:
     """Film a trial that all evaluated runs share, unless there is such a film that is newer than they are.
 
     None where fewer than two were evaluated. Raises `UsageError` where they share no trial, NoRenderer where nothing
@@ -299,7 +301,7 @@ def _film(store: Store, console: Console, tried: Sequence[Run], path: Path, quie
     first = [group.runs[0].label for group in grouped(tried)]
     chosen = [
         (run.artifacts["eval"], table)
-        for run, table in zip(tried, _told_apart(tried, TRIALS)[0], strict=True)
+        for run, table in zip(tried, _with_unique_labels(tried, TRIALS)[0], strict=True)
         if len(first) == 1 or run.label in first
     ]
     with filming(console, None if quiet else path) as progress:

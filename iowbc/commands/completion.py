@@ -18,17 +18,17 @@ def recipes(incomplete: str) -> list[str]:
 
 def ran(incomplete: str) -> list[str]:
     """Recipes that have run, or are published."""
-    from iowbc.commands.lookup import nameable
+    from iowbc.commands.lookup import known_names
 
-    return _beginning(incomplete, nameable(_store()))
+    return _beginning(incomplete, known_names(_store()))
 
 
 def artifacts(incomplete: str) -> list[str]:
     """Recipes that have run or are published, `RECIPE/STAGE`, and, once something is typed, keys."""
-    from iowbc.commands.lookup import nameable
+    from iowbc.commands.lookup import known_names
 
     store = _store()
-    known = nameable(store)
+    known = known_names(store)
     stages = [f"{name}/{stage}" for name, found in known.items() for stage in found]
     keys = [found.manifest.key for found in store.artifacts()] if incomplete else []
     return _beginning(incomplete, [*known, *stages, *keys])

@@ -26,7 +26,7 @@ REMOVING = ".removing-"
 """Beginning of the name of a folder that is being removed."""
 DAY = 86_400.0
 """Length of a day [s]."""
-PRECIOUS = 3600.0
+LONG_STAGE = 3600.0
 """A stage that took longer [s] is removed by its recipe's name alone."""
 
 
@@ -57,7 +57,7 @@ def gc(
     if store.runs.root.exists() and not dry_run:
         require_writable_runs(store.runs)
     total = 0
-    for path in dict.fromkeys(_doomed(store, unused, recipes or (), work, damaged, older_than)):
+    for path in dict.fromkeys(_to_remove(store, unused, recipes or (), work, damaged, older_than)):
         if time.time() - path.stat().st_mtime < older_than * DAY:
             continue
         count = sum(file.stat().st_size for file in (path, *path.rglob("*")) if file.is_file())
@@ -71,7 +71,7 @@ def gc(
     console.print(f"{size(total)} in all", highlight=False)
 
 
-def _doomed(
+def _to_remove(
     store: Store, unused: bool, recipes: Sequence[str], work: bool, damaged: bool, older_than: float
 ) -> Iterator[Path]:
     runs, known = store.runs, known_recipes(store)
@@ -87,7 +87,7 @@ def _doomed(
         limit = time.time() - older_than * DAY if older_than else 0.0
         spared = last | {key for name in known for key, used in ever_used(runs, name).items() if used >= limit}
         for artifact in free:
-            if artifact.manifest.key not in spared and artifact.manifest.seconds < PRECIOUS:
+            if artifact.manifest.key not in spared and artifact.manifest.seconds < LONG_STAGE:
                 yield artifact.folder
         for path in (*runs.store.glob("*/.*"), *runs.published.glob("*/.*")):
             key = path.name.split(".")[1]

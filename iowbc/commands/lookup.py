@@ -72,7 +72,7 @@ def finished_recipes(store: Store) -> list[str]:
     return sorted({*known_recipes(store), *_published(store)})
 
 
-def nameable(store: Store) -> dict[str, tuple[str, ...]]:
+def known_names(store: Store) -> dict[str, tuple[str, ...]]:
     """Recipes that `named` accepts, alphabetically, with the stages of each that can be named."""
     names = finished_recipes(store)
     return {name: tuple(_recipe(store, name, name, names).usable) for name in names}
@@ -122,7 +122,7 @@ def _by_key(store: Store, prefix: str) -> Artifact:
     if found:
         keys = ", ".join(f"{artifact.manifest.stage} {artifact.manifest.key[:12]}" for artifact in found)
         raise UsageError(f"'{prefix}' is the beginning of several keys: {keys}")
-    recipes = [*nameable(store)]
+    recipes = [*known_names(store)]
     raise UsageError(
         f"'{prefix}' is neither a recipe that has run or is published in {store.runs.root} "
         f"({', '.join(recipes) or 'none is'}), "
@@ -176,7 +176,7 @@ def film_of(runs: Runs, words: Sequence[str]) -> Path | None:
 
 
 @dataclass(frozen=True)
-class InTraining:
+class UnfinishedTraining:
     """A training that is not finished."""
 
     stage: str
@@ -190,7 +190,7 @@ class InTraining:
     """The resolved recipe; None where the checkpoint cannot be played."""
 
 
-def in_training(store: Store, word: str, stage: str | None) -> InTraining | None:
+def in_training(store: Store, word: str, stage: str | None) -> UnfinishedTraining | None:
     """The newest unfinished training that `RECIPE/STAGE`, or a recipe and `--stage`, names, if there is one."""
     name, slash, last = word.rpartition("/")
     name, wanted = (name, last) if slash else (word, stage)
@@ -202,13 +202,13 @@ def in_training(store: Store, word: str, stage: str | None) -> InTraining | None
     return None
 
 
-def _training(store: Store, folder: Path, record: Progress) -> InTraining:
+def _training(store: Store, folder: Path, record: Progress) -> UnfinishedTraining:
     checkpoint, ingredients, recipe = folder / CHECKPOINT, read_json(folder / INGREDIENTS), read_yaml(folder / RECIPE)
     state = "is being trained" if holder(store.runs, folder.name) else "was interrupted"
     share = f", {record.share} done" if record.share else ""
     playable = record.stage == PLAYED and checkpoint.is_file() and bool(recipe and ingredients)
     then = f"; this is its checkpoint of {ago(checkpoint.stat().st_mtime)}" if playable else ""
-    return InTraining(
+    return UnfinishedTraining(
         stage=record.stage,
         key=folder.name,
         text=f"{record.stage} of {record.recipe} {state}{share}{then}",
@@ -222,10 +222,10 @@ def input_of(store: Store, artifact: Artifact, stage: str) -> Artifact | None:
     """The input of a stage that an artifact was made from; None where it read nothing of that stage. Raises
     `UsageError` if it is gone."""
     manifest = artifact.manifest
-    return made_from(store, artifact.ingredients, stage, f"{manifest.stage} {manifest.key[:12]}")
+    return input_artifact(store, artifact.ingredients, stage, f"{manifest.stage} {manifest.key[:12]}")
 
 
-def made_from(store: Store, ingredients: Mapping[str, Any], stage: str, what: str) -> Artifact | None:
+def input_artifact(store: Store, ingredients: Mapping[str, Any], stage: str, what: str) -> Artifact | None:
     """The artifact of a stage among the ingredients of the key of `what`. Raises `UsageError` if it is gone."""
     digest = ingredients.get("inputs", {}).get(stage)
     if digest is None:

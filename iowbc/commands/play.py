@@ -13,8 +13,8 @@ from rich.console import Console
 from iowbc.commands import completion, options
 from iowbc.commands.lookup import (
     in_training,
+    input_artifact,
     input_of,
-    made_from,
     named,
     policy_of,
     policy_stages,
@@ -212,14 +212,14 @@ def named_source(
     A recipe file denotes the artifacts that `iowbc plan` reports as cached. The section `eval` of that file, or of the
     recipe's last run for a name, sets how they are played.
     """
-    from iowbc.evaluation.play import Source, asked_by, exported_source
+    from iowbc.evaluation.play import Source, exported_source, with_evaluation
 
     if os.path.isfile(Path(word, CONTRACT)):
         return exported_source(Path(word))
     training = in_training(store, word, stage)
     if training is not None and training.recipe is not None:
         tell(console, training.text)
-        generator = made_from(store, training.ingredients, "rg-fit", f"{training.stage} {training.key[:12]}")
+        generator = input_artifact(store, training.ingredients, "rg-fit", f"{training.stage} {training.key[:12]}")
         return Source(world_of(training.recipe, generator), training.checkpoint, training.key)
     plan = plan or planned(store, word)
     try:
@@ -240,7 +240,7 @@ def named_source(
     if scene is not None and scenes:
         require_known(scene, "scene", [*scenes, *(asked.scenes if asked else ())])
     source = _whole_source(store, artifact)
-    return source if asked is None else asked_by(source, asked)
+    return source if asked is None else with_evaluation(source, asked)
 
 
 def _whole_source(store: Store, artifact: Artifact) -> "Source":

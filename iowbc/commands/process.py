@@ -15,7 +15,7 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING
 
-from iowbc.full_disk import FULL, nothing_fits, what_is_full
+from iowbc.full_disk import FULL, is_disk_full, what_is_full
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
@@ -80,18 +80,18 @@ def let_go() -> None:
         try:
             stream.flush()
         except OSError:
-            _lead_to_nowhere(stream.fileno())
+            _redirect_to_devnull(stream.fileno())
 
 
 @contextmanager
-def outlasting_readers() -> Iterator[None]:
+def ignoring_broken_outputs() -> Iterator[None]:
     """Discard output that cannot be written: inside the block, a closed terminal or a full disk does not end a run."""
     former = sys.stdout, sys.stderr
     for stream in former:
         stream.flush()
     sys.stdout, sys.stderr = (
         io.TextIOWrapper(
-            io.BufferedWriter(_Outlasting(stream.fileno(), "wb", closefd=False)),
+            io.BufferedWriter(_ForgivingFile(stream.fileno(), "wb", closefd=False)),
             encoding=stream.encoding,
             errors="replace",
             line_buffering=True,
@@ -106,7 +106,7 @@ def outlasting_readers() -> Iterator[None]:
         sys.stdout, sys.stderr = former
 
 
-class _Outlasting(io.FileIO):
+class _ForgivingFile(io.FileIO):
     """File that switches to the null device when a write fails because the reader is gone or the disk is full."""
 
     def write(self, data: "ReadableBuffer", /) -> int:
@@ -115,13 +115,13 @@ class _Outlasting(io.FileIO):
         except OSError as error:
             if error.errno not in GONE:
                 raise
-            _lead_to_nowhere(self.fileno())
+            _redirect_to_devnull(self.fileno())
             if error.errno in FULL and self.fileno() == STANDARD_OUTPUT:
                 print(f"what is printed cannot be written any more: {error.strerror}; the run goes on", file=sys.stderr)
             return memoryview(data).nbytes
 
 
-def _lead_to_nowhere(descriptor: int) -> None:
+def _redirect_to_devnull(descriptor: int) -> None:
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, descriptor)
     os.close(nowhere)
@@ -131,7 +131,7 @@ def described(error: Exception, arguments: Sequence[str]) -> str:
     """Message of an unexpected error: a summary, the file with the details, and the next command. If that file cannot
     be written, the message includes the details."""
     again = f"to go on: {shlex.join(['iowbc', *arguments])}"
-    if nothing_fits(error):
+    if is_disk_full(error):
         full = what_is_full(error, (Path("runs"), Path(os.environ.get("TMPDIR", "/tmp"))))
         return f"no space is left: {full}; make some (`iowbc gc` removes what you name), and then\n{again}"
     summary = " ".join(f"{type(error).__name__}: {error}".split())[:300]

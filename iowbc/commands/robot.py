@@ -59,7 +59,7 @@ def robot(
     from iowbc.onboard.log import LogWriter, export_digest
     from iowbc.onboard.machine import Machine
     from iowbc.onboard.operators import Keyboard, OperatorWithPoses, Ranges, Udp, object_poses, operator, single_keys
-    from iowbc.onboard.process import LockStep, MonotonicClock, drive, listen, prefer_this_process
+    from iowbc.onboard.process import LockStep, MonotonicClock, drive, enable_realtime, listen
 
     console = stdout_console()
     controller = Controller.load(exported_folder(what))
@@ -90,7 +90,7 @@ def robot(
             if isinstance(port, Udp):
                 stack.callback(port.close)
         source.wanted(0.0, None)  # discard commands from before the robot was ready
-        pace = "in step with the simulated robot" if lockstep else prefer_this_process()
+        pace = "in step with the simulated robot" if lockstep else enable_realtime()
         tell(console, f"{pace}; zero torque; commands from {commands}; Ctrl+C damps and ends")
         clock: Clock = LockStep() if lockstep else MonotonicClock()
         times = drive(

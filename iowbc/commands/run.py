@@ -9,10 +9,10 @@ import typer
 from rich.console import Console
 
 from iowbc.commands import options
-from iowbc.commands.compare import compare, film_together
+from iowbc.commands.compare import compare, film_joint
 from iowbc.commands.plan import print_plan
 from iowbc.commands.printed import shown_path, stdout_console, tell
-from iowbc.commands.process import DONE, INTERRUPTED, STAGE_FAILED, RunEnding, outlasting_readers
+from iowbc.commands.process import DONE, INTERRUPTED, STAGE_FAILED, RunEnding, ignoring_broken_outputs
 from iowbc.commands.request import Request, in_order, planners
 from iowbc.commands.results import main_tables, print_results
 from iowbc.errors import Interrupted, NoRenderer, PipelineFailed, UsageError
@@ -56,7 +56,7 @@ def run(
         print_plan(request, stdout_console())
         return
     manner: Manner = "quiet" if quiet else "verbose" if verbose else "usual"
-    with outlasting_readers():
+    with ignoring_broken_outputs():
         raise typer.Exit(run_request(request, stdout_console(), manner))
 
 
@@ -97,7 +97,7 @@ def compare_variants(request: Request, loaded: Sequence[LoadedRecipe], console: 
     before = _report_of(output)
     compare(words, output, runs=request.runs.root)
     try:
-        film = film_together(Store(request.runs), console, words, output)
+        film = film_joint(Store(request.runs), console, words, output)
     except (NoRenderer, UsageError) as reason:
         film = None
         tell(console, f"no film: {reason}")

@@ -14,7 +14,7 @@ from iowbc.commands.lookup import named, record_sweep
 from iowbc.commands.plan import PlannedStage, in_all, plan_table, planned, step_data
 from iowbc.commands.points import Endings, PointProcess, PointRun, PointThread, run_points
 from iowbc.commands.printed import print_json, shown_path, stdout_console, tell
-from iowbc.commands.process import DONE, INTERRUPTED, STAGE_FAILED, RunEnding, outlasting_readers
+from iowbc.commands.process import DONE, INTERRUPTED, STAGE_FAILED, RunEnding, ignoring_broken_outputs
 from iowbc.commands.request import Request, in_order, prepared
 from iowbc.commands.run import requested_cluster, run_recipe
 from iowbc.errors import Problem, RecipeError, UsageError
@@ -74,7 +74,7 @@ def sweep(
     if dry_run:
         plan_sweep(request, file, stdout_console(), as_json, points)
         return
-    with outlasting_readers():
+    with ignoring_broken_outputs():
         raise typer.Exit(run_sweep(request, file, jobs, points, stdout_console(), quiet))
 
 

@@ -18,7 +18,7 @@ class ArmGravity(Constants):
         moment, mass = np.zeros((hinges, 3, 2, 1)), np.zeros((hinges, 1, 2, 1))
         for side, chain in enumerate(chains):
             for place, body in enumerate(body for body in chain if body.hinge is not None):
-                mass[place, :, side], moment[place, :, side, 0] = robot.tree.burden(body.name)
+                mass[place, :, side], moment[place, :, side, 0] = robot.tree.rigid_mass(body.name)
         self._mass, self._moment = mass, moment
         self._outward = np.cumsum(mass[::-1], axis=0)[::-1].copy()
         self._grip = robot.grip_offset.T[:, :, None]

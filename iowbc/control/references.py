@@ -69,7 +69,7 @@ class ReferenceLayer(Constants):
         parts = [command[:, :HEIGHT], height[:, None], pitch[:, None], command[:, OFFSET]]
         return namespace(command).concatenate(parts, 1)
 
-    def startable(self, command: Array) -> Array:
+    def start_command(self, command: Array) -> Array:
         """The command with the posture in which an episode can start, (n, 11): without a generator the default one."""
         if self.network is not None:
             return command

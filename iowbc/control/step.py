@@ -15,7 +15,7 @@ from iowbc.arrays import Array, Constants, namespace
 from iowbc.control import gait
 from iowbc.control.action import action_scale
 from iowbc.control.command import COMMAND, YAW_RATE, approach, rate_limits
-from iowbc.control.observation import ObservationLayout, Sensed
+from iowbc.control.observation import ObservationLayout, PolicyInputs
 from iowbc.control.references import ReferenceLayer
 from iowbc.control.sensors import Measured
 from iowbc.recipe.task.task import Task
@@ -131,7 +131,7 @@ class ControlStep(Constants):
         phase, feedback = xp.where(begun[:, 0], phase, before), xp.where(begun, feedback, state.feedback)
         stepping = (begun[:, 0] & runs) | (~begun[:, 0] & ran)
         support = self.references.with_stride(posture, command, phase, stepping, feedback)
-        sensed = Sensed(
+        sensed = PolicyInputs(
             measured=measured,
             command=command,
             heading_reference=state.heading_reference,

@@ -16,7 +16,7 @@ from iowbc.evaluation.trials.errors import ERRORS
 from iowbc.evaluation.trials.metrics import trial_metrics
 from iowbc.evaluation.trials.plan import UNDISTURBED, command_script, planned_episode
 from iowbc.evaluation.trials.rollout import play_episodes, play_in
-from iowbc.evaluation.trials.table import carried_along
+from iowbc.evaluation.trials.table import transported
 from iowbc.evaluation.trials.trace import Outcome
 from iowbc.learning.acting import Policy
 from iowbc.recipe.evaluation.sequences import Segment
@@ -94,7 +94,7 @@ def acceptance_episodes(recipe: Recipe) -> list[Episode]:
     return found
 
 
-def try_out(
+def run_acceptance(
     world: Specification, exported: Path, interrupted: Callable[[], bool]
 ) -> tuple[ExportedPolicy, list[Accepted]]:
     """Run the acceptance trials with the controller in the folder `exported`. Raises Interrupted when interrupted.
@@ -127,7 +127,7 @@ def judged(recipe: Recipe, robot: Robot, asked: Acceptance, trials: list[tuple[E
     return Accepted(
         asked,
         survived=sum(survived),
-        passed=sum(alive and carried_along(asked, one) for alive, one in zip(survived, metrics, strict=True)),
+        passed=sum(alive and transported(asked, one) for alive, one in zip(survived, metrics, strict=True)),
         weight_in_hands=float(np.mean([one["weight_in_hands"] for one in metrics])),
         transport=float(np.mean([one["transport_robot"] for one in metrics])),
         errors=np.mean([[one[name] for name in ERRORS] for one in metrics], axis=0),

@@ -46,7 +46,7 @@ class Source:
             return VectorEnv(self.world, num_envs=1, workers=0, seed=0, episodes=(episode,))
 
 
-def asked_by(source: Source, evaluation: Evaluation) -> Source:
+def with_evaluation(source: Source, evaluation: Evaluation) -> Source:
     """The source with the sequence, scenes and video settings of another evaluation. An exported controller keeps the
     scenes of its contract."""
     asked = source.world.recipe.model_copy(update={"eval": evaluation})

@@ -47,7 +47,7 @@ class ProbeReadings:
     holds the initial copies of the first observation), and `mass` of the object [kg]."""
 
 
-class Listener:
+class RecordingPolicy:
     """Wrapper of a policy that records its inputs every `every` control steps."""
 
     def __init__(self, policy: Policy, environments: int, every: int, length: int) -> None:
@@ -116,7 +116,7 @@ def read(
     episodes, probe = probe_episodes(recipe), recipe.eval.probe
     assert probe is not None
     frequency = recipe.task.control_frequency
-    listener = Listener(policy, len(episodes), math.ceil(probe.interval * frequency), recipe.distill.history)
+    listener = RecordingPolicy(policy, len(episodes), math.ceil(probe.interval * frequency), recipe.distill.history)
     outcomes = play_episodes(world, episodes, listener, workers=workers, interrupted=interrupted, progress=progress)
     times = np.arange(len(listener.kept)) * listener.every / frequency
     going = times[:, None] < np.array([outcome.seconds for outcome in outcomes])

@@ -28,7 +28,7 @@ def prepare_process() -> None:
     keep_freed_memory()
 
 
-class SideBySide:
+class ParallelBatch:
     """Parallel evaluation of a function on the parts of a batch."""
 
     def __init__(self, parts: int, cores: int) -> None:

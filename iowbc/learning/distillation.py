@@ -21,7 +21,7 @@ def spread(environments: int) -> NDArray[np.float64]:
     return np.array([index * golden % 1.0 for index in range(environments)])
 
 
-class Experience:
+class ReplayBuffer:
     """Ring buffer of the newest control steps of n environments: s_t, target and age of the episode in steps.
 
     A sample is the student's history H_t, rebuilt from the buffer, and its target: the teacher's action and any further

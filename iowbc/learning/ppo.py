@@ -21,7 +21,7 @@ from torch import Tensor
 
 from iowbc.arrays import Array
 from iowbc.learning.as_numpy import acting_policy
-from iowbc.learning.computing import SideBySide, reduced
+from iowbc.learning.computing import ParallelBatch, reduced
 from iowbc.learning.gaussian import divergence, entropy, log_density
 from iowbc.learning.history_actor import student_architecture
 from iowbc.learning.networks import Mirrors, mirrors_as_json
@@ -61,7 +61,7 @@ class Learner:
         env.seed(seed)
         self.settings, self.env, self.device = teacher, env, torch.device(device)
         self._on_cpu = self.device.type == "cpu"
-        self.side_by_side = SideBySide(teacher.parts if self._on_cpu else 1, cores)
+        self.side_by_side = ParallelBatch(teacher.parts if self._on_cpu else 1, cores)
         self._arguments = _policy_arguments(teacher, env, mirrors, value_only)
         self.policy = ActorCritic(
             env.observation_space,
@@ -140,9 +140,9 @@ class Learner:
         self.steps += settings.rollout * env.num_envs
         self.observation = found.observation[-1]
         with self._timed("learning"):
-            self._look_back(found)
+            self._process_rollout(found)
 
-    def _look_back(self, found: Trajectories) -> None:
+    def _process_rollout(self, found: Trajectories) -> None:
         """Add the policy's outputs, values and advantages of a rollout to the samples."""
         samples, settings, shape = self.samples, self.settings, found.reward.shape
         columns = samples.columns
@@ -180,7 +180,7 @@ class Learner:
             own["log_density"].copy_(log_density(own["action"], own["mean"], policy.log_std))
             own["value"].copy_(policy.critic.head(policy.critic.hidden(own["observation"]))[:, 0])
 
-    def explore_anew(self) -> None:
+    def restart_exploration(self) -> None:
         """Reset the standard deviation once, before the first update after the recipe's restart step."""
         restart, passed = self.settings.restart, self.steps - self.settings.rollout * self.env.num_envs
         if restart is not None and passed < restart.after <= self.steps:

@@ -12,7 +12,7 @@ from torch import Tensor
 
 from iowbc.learning import checkpoint
 from iowbc.learning.as_numpy import student_policy, teacher_policy
-from iowbc.learning.distillation import Experience, mirror_half, spread
+from iowbc.learning.distillation import ReplayBuffer, mirror_half, spread
 from iowbc.learning.distillation_loss import DistillationLoss, Symmetry
 from iowbc.learning.environments import Environments
 from iowbc.learning.networks import StudentNetwork, TeacherNetwork, mirror_as_json, mirrors_as_json
@@ -88,7 +88,7 @@ class StudentTraining:
         self.facts_mean, self.facts_std = teacher.normalizer.mean[rows.facts], teacher.normalizer.std[rows.facts]
         self.optimizer = torch.optim.Adam(self.loss.parameters(), settings.learning_rate)
         self.random = np.random.default_rng(seed)
-        self.experience = Experience(
+        self.experience = ReplayBuffer(
             settings.buffer, settings.environments, size, actions + len(rows.facts), settings.history
         )
         self.history = History(settings.environments, settings.history, size)

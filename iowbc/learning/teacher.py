@@ -16,7 +16,7 @@ from iowbc.learning.environments import Environments
 from iowbc.learning.networks import Mirrors
 from iowbc.learning.ppo import Learner
 from iowbc.learning.storage import Network
-from iowbc.learning.trained import take_over, trained_network
+from iowbc.learning.trained import load_policy_weights, trained_network
 from iowbc.recipe.teacher import Teacher
 
 FLOOR_REACHED = 1.01
@@ -55,7 +55,7 @@ class TeacherTraining:
         if settings.average_half_life is not None:
             updates = settings.average_half_life / (settings.environments * settings.rollout)
             self.average = PolicyAverage(self.model.policy, updates)
-        self.best = Best(settings.check, self._learnt())
+        self.best = Best(settings.check, self._learner_state())
 
     @property
     def steps(self) -> int:
@@ -75,7 +75,7 @@ class TeacherTraining:
         model, begin = self.model, time.perf_counter()
         model.seconds = dict.fromkeys(model.seconds, 0.0)
         model.caution = self.best.caution
-        model.explore_anew()
+        model.restart_exploration()
         model.collect()
         training = model.train()
         if self.average is not None:
@@ -102,7 +102,7 @@ class TeacherTraining:
             else:
                 self.best.offer(found["check/score"], self._scored())
         if why:
-            self._learn_again(self.best.go_back(f"{why} at {self.steps:,} steps"))
+            self._restore_learner(self.best.go_back(f"{why} at {self.steps:,} steps"))
             low, _ = self.settings.learning_rate_range
             self.model.learning_rate = max(low, self.settings.check.caution * self.model.learning_rate)
             self.say(f"{why} at {self.steps:,} steps: goes back to the best policy, with smaller steps")
@@ -116,9 +116,9 @@ class TeacherTraining:
         """End the training: score the last policy, then restore the best learner state."""
         if self.score is not None:
             self.best.offer(float(self.score(policy_of(*self.network()))["score"]), self._scored())
-            self._learn_again(self.best.learner)
+            self._restore_learner(self.best.learner)
 
-    def _learnt(self) -> Arrays:
+    def _learner_state(self) -> Arrays:
         """State of the learner: networks, optimiser, normalisation statistics."""
         return {
             **prefixed("policy", checkpoint.module_arrays(self.model.policy)),
@@ -132,10 +132,10 @@ class TeacherTraining:
 
     def _scored(self) -> Arrays:
         """State of the learner with the policy of `_acting`, which checks score."""
-        return {**self._learnt(), **prefixed("policy", self._acting())}
+        return {**self._learner_state(), **prefixed("policy", self._acting())}
 
-    def _learn_again(self, learnt: Mapping[str, NDArray[Any]]) -> None:
-        """Inverse of `_learnt`."""
+    def _restore_learner(self, learnt: Mapping[str, NDArray[Any]]) -> None:
+        """Inverse of `_learner_state`."""
         if self.average is not None:
             self.average.restore(under("policy", learnt))
         checkpoint.restore_module(self.model.policy, under("policy", learnt))
@@ -147,7 +147,7 @@ class TeacherTraining:
         model = self.model
         assert model.observation is not None, "arrays() comes after an update"
         return {
-            **self._learnt(),
+            **self._learner_state(),
             **prefixed("best", self.best.arrays()),
             **prefixed("random", checkpoint.random_arrays()),
             **prefixed("environment", self.environments.state()),
@@ -165,7 +165,7 @@ class TeacherTraining:
         """
         model = self.model
         try:
-            take_over(model.policy, network)
+            load_policy_weights(model.policy, network)
         except RuntimeError as error:
             names = "teacher.hidden, activation, symmetry and history (estimate, too)"
             path, _ = self.settings.beginning
@@ -177,12 +177,12 @@ class TeacherTraining:
         model.value_alone = self.settings.value_first
         if self.settings.desired_kl is not None:
             model.learning_rate = min(self.settings.learning_rate_range)
-        self.best = Best(self.settings.check, self._learnt())
+        self.best = Best(self.settings.check, self._learner_state())
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Inverse of `arrays`, for a training with the same recipe."""
         model = self.model
-        self._learn_again(arrays)
+        self._restore_learner(arrays)
         if self.average is not None:
             self.average.restore(under("average", arrays))
         self.best.restore(under("best", arrays))

@@ -53,7 +53,7 @@ def trained_network(
     return network.eval(), architecture
 
 
-def take_over(policy: ActorCritic, network: Network) -> None:
+def load_policy_weights(policy: ActorCritic, network: Network) -> None:
     """Load a trained network's mean action and standard deviation into a PPO policy; its value network is unchanged.
 
     Raises RuntimeError if the networks have different architectures.

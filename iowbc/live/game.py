@@ -97,7 +97,7 @@ class GameSession(Played):
         self._steps += 1
         self.track.moments.append(self._look())
         if self._steps % batch.substeps == 0:
-            batch.conclude()
+            batch.finish_decision()
             outcome = self._game.outcome()
             self._seen = outcome.observed
             if outcome.terminated[0] or outcome.truncated[0]:

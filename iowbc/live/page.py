@@ -132,7 +132,7 @@ class Page:
 
     def _live(self, now: float) -> None:
         session, panel = self.session, self.panel
-        self._begin_anew(now)
+        self._start_new_episode(now)
         if now >= self._looked + CHECKPOINTS:
             self._looked = now
             session.refresh()
@@ -152,7 +152,7 @@ class Page:
         self.track = session.track
         self.place = self.track.place(self.track.end + (panel.time.value if self.paused else 0.0))
 
-    def _begin_anew(self, now: float) -> None:
+    def _start_new_episode(self, now: float) -> None:
         """Start a new episode once the controls request other conditions and are no longer being changed."""
         wish = self.panel.conditions
         if wish != self._wish:

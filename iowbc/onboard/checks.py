@@ -78,7 +78,7 @@ class CheckResult:
 
 
 @dataclass(frozen=True)
-class Listened:
+class BusSnapshot:
     """Messages received while listening to the bus before the robot moves."""
 
     states: Sequence[Record]
@@ -90,7 +90,7 @@ class Listened:
     """The robot's active built-in controller: "" for none, None without an answer."""
 
 
-def checks(controller: Controller, heard: Listened, wanted: Array, limits: SafetyLimits) -> list[CheckResult]:
+def checks(controller: Controller, heard: BusSnapshot, wanted: Array, limits: SafetyLimits) -> list[CheckResult]:
     """All checks, most important first; `wanted`: the command to stand, (11,)."""
     contract = controller.contract
     if not heard.states:

@@ -12,7 +12,7 @@ import numpy as np
 from iowbc.arrays import Array
 from iowbc.control.command import HEIGHT, PITCH, YAW_RATE
 from iowbc.errors import UsageError
-from iowbc.onboard.log import read_turns
+from iowbc.onboard.log import read_cycles
 from iowbc.onboard.machine import FREQUENCY
 from iowbc.onboard.sensors import Sensors
 from iowbc.robot import rotations
@@ -56,7 +56,7 @@ def read_run(path: Path, robot: Robot, control_frequency: float, gait_frequency:
     file."""
     sensors, every = Sensors(len(robot.joints)), round(FREQUENCY / control_frequency)
     full, rows, soles, begin = 0.99 * robot.kp, [], [], None
-    for number, (given, command) in enumerate(read_turns(path)):
+    for number, (given, command) in enumerate(read_cycles(path)):
         begin = given.now if begin is None else begin
         sensors.take(given.states, given.now)
         stiff = (command["motor_cmd"]["kp"][: len(robot.joints)] >= full).all()

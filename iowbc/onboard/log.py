@@ -18,7 +18,7 @@ from iowbc.deploy.controller import Controller
 from iowbc.errors import Damaged, UsageError
 from iowbc.onboard import messages
 from iowbc.onboard.checks import SafetyLimits
-from iowbc.onboard.machine import Machine, State, TurnInputs, Wanted
+from iowbc.onboard.machine import CycleInputs, Machine, OperatorRequest, State
 from iowbc.onboard.messages import Record, from_cdr, to_cdr
 
 TOPICS = {messages.LOW_STATE: "rt/lowstate", messages.LOW_COMMAND: "rt/lowcmd"}
@@ -51,7 +51,7 @@ class LogWriter:
         self._thread = threading.Thread(target=self._write, name="log")
         self._thread.start()
 
-    def turn(self, given: TurnInputs, command: Record) -> None:
+    def turn(self, given: CycleInputs, command: Record) -> None:
         wanted = given.wanted
         self.add(
             "inputs",
@@ -121,7 +121,7 @@ def read_messages(path: Path) -> Iterator[tuple[str, float, bytes]]:
                 raise Damaged(f"{path}: {type(error).__name__}: {error}") from error
 
 
-def read_turns(path: Path) -> Iterator[tuple[TurnInputs, Record]]:
+def read_cycles(path: Path) -> Iterator[tuple[CycleInputs, Record]]:
     """Inputs and command of each cycle, in order. Raises Damaged and UsageError."""
     inputs: dict[str, Any] | None = None
     states: list[Record] = []
@@ -134,16 +134,16 @@ def read_turns(path: Path) -> Iterator[tuple[TurnInputs, Record]]:
             yield _inputs(inputs, states), from_cdr(messages.LOW_COMMAND, data)
 
 
-def _inputs(logged: dict[str, Any], states: list[Record]) -> TurnInputs:
+def _inputs(logged: dict[str, Any], states: list[Record]) -> CycleInputs:
     request = logged["request"]
-    wanted = Wanted(
+    wanted = OperatorRequest(
         command=np.array(logged["command"]),
         at=_never(logged["at"]),
         request=None if request is None else State(request),
         seen={name: np.array(values) for name, values in logged["seen"].items()},
         seen_at=_never(logged["seen_at"]),
     )
-    return TurnInputs(logged["now"], tuple(states), wanted, logged["others"], logged.get("charge"))
+    return CycleInputs(logged["now"], tuple(states), wanted, logged["others"], logged.get("charge"))
 
 
 def _finite(time: float) -> float | None:
@@ -172,7 +172,7 @@ def replay(path: Path, folder: Path) -> tuple[int, int]:
         raise UsageError(f"{path}: logged with another export ({about['recipe']}); give the folder of that one")
     machine = Machine(controller, about["scene"], SafetyLimits.model_validate_json(about["limits"]))
     turns = different = 0
-    for given, command in read_turns(path):
+    for given, command in read_cycles(path):
         turns += 1
         different += machine.turn(given).tobytes() != command.tobytes()
     return turns, different

@@ -43,7 +43,7 @@ MOVING = tuple(BEFORE)
 
 
 @dataclass(frozen=True)
-class Wanted:
+class OperatorRequest:
     """Command and request of an operator."""
 
     command: Array
@@ -59,14 +59,14 @@ class Wanted:
 
 
 @dataclass(frozen=True)
-class TurnInputs:
+class CycleInputs:
     """Inputs of a cycle of the loop."""
 
     now: float
     """Monotonic clock [s]."""
     states: tuple[Record, ...]
     """States that arrived since the last cycle, oldest first."""
-    wanted: Wanted
+    wanted: OperatorRequest
     others: int = 0
     """Number of low-level commands from other programs since the last cycle."""
     charge: float | None = None
@@ -97,13 +97,13 @@ class Machine:
         self._warned: set[str] = set()
         self._from = self._goal = self._target = np.array(contract.default_position)
 
-    def turn(self, given: TurnInputs) -> Record:
+    def turn(self, given: CycleInputs) -> Record:
         """Low-level command of this cycle."""
         self.events = []
         self.sensors.take(given.states, given.now)
         self._charge = self._charge if given.charge is None else given.charge
         wanted = given.wanted.request
-        if self.state in MOVING and (reason := self._danger(given)) is not None:
+        if self.state in MOVING and (reason := self._fault(given)) is not None:
             self._enter(State.DAMPING, given, reason)
         elif wanted is not None and wanted is not self.state:
             if (refusal := self._refusal(wanted, given)) is None:
@@ -119,18 +119,18 @@ class Machine:
             self._act(given)
         return self._command(given.now)
 
-    def _danger(self, given: TurnInputs) -> str | None:
+    def _fault(self, given: CycleInputs) -> str | None:
         """Reason to damp, or None."""
         limits = self.limits
         if given.others:
             return f"second publisher: {given.others} low-level commands of another program"
         if (gap := given.now - self._last) > limits.overrun:
             return f"loop overrun: {1e3 * gap:.1f} ms since the last turn"
-        if self.state is State.RUN and (reason := self._uninformed(given)) is not None:
+        if self.state is State.RUN and (reason := self._stale_input(given)) is not None:
             return reason
-        return self._unfit(given.now)
+        return self._motion_fault(given.now)
 
-    def _unfit(self, now: float) -> str | None:
+    def _motion_fault(self, now: float) -> str | None:
         """Reason against moving, of a robot that has sent states."""
         limits, posture = self.limits, self.sensors.posture
         assert posture is not None
@@ -144,7 +144,7 @@ class Machine:
         assert self.sensors.posture is not None
         return checks.exhausted(self.sensors.posture, self._charge, self._contract.joints, least, most)
 
-    def _refusal(self, wanted: State, given: TurnInputs) -> str | None:
+    def _refusal(self, wanted: State, given: CycleInputs) -> str | None:
         """Reason to refuse a requested state."""
         limits, now = self.limits, self.sensors.posture
         if wanted not in BEFORE:
@@ -153,7 +153,7 @@ class Machine:
             return f"it follows {' or '.join(BEFORE[wanted])}, and the robot is in {self.state}"
         if now is None:
             return "no state has arrived"
-        if (reason := self._unfit(given.now)) is not None:
+        if (reason := self._motion_fault(given.now)) is not None:
             return reason
         if now.tilt > limits.standing_tilt:
             return f"the pelvis leans by {now.tilt:.2f} rad, more than {limits.standing_tilt:g}"
@@ -165,10 +165,10 @@ class Machine:
             error = np.abs(now.position - self._goal)
             if error[worst := int(np.argmax(error))] > limits.standing_error:
                 return f"{self._contract.joints[worst]} is {error[worst]:.2f} rad from the standing posture"
-            return self._uninformed(given)
+            return self._stale_input(given)
         return None
 
-    def _uninformed(self, given: TurnInputs) -> str | None:
+    def _stale_input(self, given: CycleInputs) -> str | None:
         """Reason if the newest command, or an object pose that the policy observes, is stale or missing."""
         wanted, limits = given.wanted, self.limits
         if (age := given.now - wanted.at) > limits.command_age:
@@ -179,7 +179,7 @@ class Machine:
             return f"stale object pose: nothing new for {age:.2f} s"
         return None
 
-    def _enter(self, state: State, given: TurnInputs, why: str) -> None:
+    def _enter(self, state: State, given: CycleInputs, why: str) -> None:
         self.state, self._entered, self._turn = state, given.now, 0
         self.events.append(f"{state}: {why}")
         if state is State.STAND:
@@ -190,7 +190,7 @@ class Machine:
         elif state is State.RUN:
             self.controller.reset(scene=self._scene)
 
-    def _act(self, given: TurnInputs) -> None:
+    def _act(self, given: CycleInputs) -> None:
         """A policy step every `_turns` cycles; if its targets are held, the robot damps."""
         if self._turn == 0:
             measured = replace(self.sensors.measured, **given.wanted.seen)

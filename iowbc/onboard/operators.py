@@ -19,7 +19,7 @@ from iowbc.control.command import COMMAND, HEIGHT, OFFSET, PITCH, YAW_RATE, nomi
 from iowbc.control.sensors import quantities
 from iowbc.deploy.contract import Contract
 from iowbc.errors import UsageError
-from iowbc.onboard.machine import State, Wanted
+from iowbc.onboard.machine import OperatorRequest, State
 from iowbc.onboard.messages import Record
 from iowbc.recipe.section import Section
 
@@ -41,7 +41,7 @@ LARGEST_DATAGRAM = 8192
 class Operator(Protocol):
     """A source of commands."""
 
-    def wanted(self, now: float, state: Record | None) -> Wanted:
+    def wanted(self, now: float, state: Record | None) -> OperatorRequest:
         """Command and request at `now` [s]; `state`: the robot's newest state."""
 
 
@@ -74,9 +74,9 @@ class Remote:
     def __init__(self, ranges: Ranges) -> None:
         self._ranges, self._command, self._pressed, self._last = ranges, ranges.standing.copy(), 0, 0.0
 
-    def wanted(self, now: float, state: Record | None) -> Wanted:
+    def wanted(self, now: float, state: Record | None) -> OperatorRequest:
         if state is None:
-            return Wanted(self._command.copy(), now)
+            return OperatorRequest(self._command.copy(), now)
         data = state["wireless_remote"].tobytes()
         bits, left_x, right_x, _, _, left_y = struct.unpack_from("<2xHfffff", data)
         down = {name for place, name in enumerate(BUTTONS) if bits >> place & 1}
@@ -88,7 +88,7 @@ class Remote:
         self._command[PITCH] += PITCH_RATE * passed * (("right" in down) - ("left" in down))
         self._command = self._ranges.clipped(self._command)
         request = next((wanted for name, wanted in REQUESTS.items() if name in fresh), None)
-        return Wanted(self._command.copy(), now, State.DAMPING if "B" in down else request)
+        return OperatorRequest(self._command.copy(), now, State.DAMPING if "B" in down else request)
 
     def _stick(self, axis: int, value: float) -> float:
         if not abs(value) > DEAD:
@@ -104,7 +104,7 @@ class Keyboard:
     def __init__(self, ranges: Ranges) -> None:
         self._ranges, self._command = ranges, ranges.standing.copy()
 
-    def wanted(self, now: float, state: Record | None) -> Wanted:
+    def wanted(self, now: float, state: Record | None) -> OperatorRequest:
         request = None
         while select.select([sys.stdin], [], [], 0.0)[0] and (key := os.read(sys.stdin.fileno(), 1).decode("latin-1")):
             request = State.DAMPING if request is State.DAMPING else KEYS.get(key, request)
@@ -114,7 +114,7 @@ class Keyboard:
             elif key == "x":
                 self._command[:HEIGHT] = 0.0
         self._command = self._ranges.clipped(self._command)
-        return Wanted(self._command.copy(), now, request)
+        return OperatorRequest(self._command.copy(), now, request)
 
 
 @contextlib.contextmanager
@@ -164,9 +164,9 @@ class Udp:
             raise UsageError(f"udp:{port}: {error}; choose another port") from error
         self._socket.setblocking(False)
         self.port: int = self._socket.getsockname()[1]
-        self._wanted = Wanted(ranges.standing, -np.inf)
+        self._wanted = OperatorRequest(ranges.standing, -np.inf)
 
-    def wanted(self, now: float, state: Record | None) -> Wanted:
+    def wanted(self, now: float, state: Record | None) -> OperatorRequest:
         request = None
         with contextlib.suppress(BlockingIOError):
             while True:
@@ -181,7 +181,7 @@ class Udp:
     def close(self) -> None:
         self._socket.close()
 
-    def _given(self, given: Datagram, now: float) -> Wanted:
+    def _given(self, given: Datagram, now: float) -> OperatorRequest:
         command = self._ranges.standing.copy()
         command[:HEIGHT] = *given.velocity, given.yaw_rate
         for place, value in ((HEIGHT, given.height), (PITCH, given.pitch)):
@@ -190,7 +190,7 @@ class Udp:
         command = np.where(np.isfinite(command), self._ranges.clipped(command), self._ranges.standing)
         known = quantities(of_object=True)
         seen: dict[str, Any] = {name: np.array([given.seen[name]]) for name in known if name in given.seen}
-        return Wanted(command, now, None, seen or self._wanted.seen, now if seen else self._wanted.seen_at)
+        return OperatorRequest(command, now, None, seen or self._wanted.seen, now if seen else self._wanted.seen_at)
 
 
 @dataclass(frozen=True)
@@ -201,7 +201,7 @@ class OperatorWithPoses:
     poses: Udp
     """Only `seen` of its datagrams is used."""
 
-    def wanted(self, now: float, state: Record | None) -> Wanted:
+    def wanted(self, now: float, state: Record | None) -> OperatorRequest:
         pose = self.poses.wanted(now, state)
         return replace(self.operator.wanted(now, state), seen=pose.seen, seen_at=pose.seen_at)
 

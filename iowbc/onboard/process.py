@@ -11,9 +11,9 @@ from typing import Protocol
 import numpy as np
 
 from iowbc.onboard import messages
-from iowbc.onboard.checks import Listened
+from iowbc.onboard.checks import BusSnapshot
 from iowbc.onboard.log import LogWriter
-from iowbc.onboard.machine import FREQUENCY, Machine, State, TurnInputs
+from iowbc.onboard.machine import FREQUENCY, CycleInputs, Machine, State
 from iowbc.onboard.messages import Record
 from iowbc.onboard.operators import Operator
 
@@ -112,23 +112,23 @@ class Times:
         return "; ".join([f"{len(self.late)} turns", *parts])
 
 
-def listen(bus: Bus, seconds: float) -> Listened:
+def listen(bus: Bus, seconds: float) -> BusSnapshot:
     """Receives messages for some time [s] from the first state on."""
     states: list[Record] = []
     battery: Record | None = None
     others = 0
     if not bus.wait(messages.LOW_STATE, DISCOVERY):
-        return Listened([], DISCOVERY, None, 0, None)
+        return BusSnapshot([], DISCOVERY, None, 0, None)
     begin = time.monotonic()
     while (spent := time.monotonic() - begin) < seconds:
         bus.wait(messages.LOW_STATE, 0.01)
         states += bus.take(messages.LOW_STATE)
         others += len(bus.take(messages.LOW_COMMAND))
         battery = next(iter(bus.take(messages.BATTERY_STATE)[::-1]), battery)
-    return Listened(states, spent, battery, others, bus.high_level_mode(seconds))
+    return BusSnapshot(states, spent, battery, others, bus.high_level_mode(seconds))
 
 
-def prefer_this_process() -> str:
+def enable_realtime() -> str:
     """Locks memory and raises the priority where allowed; returns a summary."""
     libc = ctypes.CDLL(None, use_errno=True)
     locked = libc.mlockall(3) == 0  # MCL_CURRENT | MCL_FUTURE
@@ -170,7 +170,7 @@ def drive(
             wanted = replace(wanted, request=State.DAMPING)
         batteries = bus.take(messages.BATTERY_STATE)
         charge = float(batteries[-1]["soc"]) if batteries else None
-        given = TurnInputs(now, states, wanted, others, charge)
+        given = CycleInputs(now, states, wanted, others, charge)
         command = machine.turn(given)
         bus.publish(command)
         for event in machine.events:

@@ -8,7 +8,7 @@ from pathlib import Path
 from iowbc.pipeline.stage import Stage
 from iowbc.pipeline.store.digests import PACKAGE, content_digest, syntax_digest
 
-CARRYING_OUT = ("pipeline", "errors", "files", "full_disk", "processes")
+INFRASTRUCTURE = ("pipeline", "errors", "files", "full_disk", "processes")
 """Subpackages and modules that run stages but compute no result; they and their imports are ignored."""
 IN_KEYS = "recipe.recipe"
 """The module of the whole recipe, whose imports are ignored: its values are in keys, and sections count only if a
@@ -52,7 +52,7 @@ def _imports(source: Path) -> frozenset[str]:
     """Modules of the package that a module imports when it runs, also within functions, by their names below it."""
     tree = ast.parse(source.read_bytes(), filename=str(source))
     names = {name.removeprefix(f"{PACKAGE.name}.") for name in _imported(tree) if name.startswith(f"{PACKAGE.name}.")}
-    counting = {name for name in names if name != IN_KEYS and name.split(".")[0] not in CARRYING_OUT}
+    counting = {name for name in names if name != IN_KEYS and name.split(".")[0] not in INFRASTRUCTURE}
     return frozenset(name for name in counting if _source(name).is_file())
 
 

@@ -8,7 +8,7 @@ from typing import Any
 from iowbc.errors import Damaged, Problem, RecipeError, shown
 from iowbc.pipeline.code import changed_code, stage_code
 from iowbc.pipeline.nested import MISSING, differences, nested
-from iowbc.pipeline.stage import Borrowed, Stage, slice_value
+from iowbc.pipeline.stage import ExternalInput, Stage, slice_value
 from iowbc.pipeline.stage_plan import Options, StagePlan
 from iowbc.pipeline.stage_time import estimated
 from iowbc.pipeline.store.artifact import Artifact
@@ -71,7 +71,7 @@ class Planner:
                 found[name] = self.named(one)
         return found
 
-    def named(self, borrowed: Borrowed) -> Artifact:
+    def named(self, borrowed: ExternalInput) -> Artifact:
         """The stored artifact whose key the recipe names. Raises `RecipeError` unless exactly one fits, undamaged."""
         found = [one for one in self.store.artifacts(borrowed.stage) if one.manifest.key.startswith(borrowed.named)]
         if len(found) != 1:
@@ -104,13 +104,13 @@ class Planner:
             step = estimated(step, ingredients, self.store.artifacts(stage.name), former)
         if unknown:
             return replace(step, reasons=tuple(self._reasons(ingredients, former, unknown)))
-        step = self._looked_up(replace(step, key=data_digest(ingredients), ingredients=ingredients), whole)
+        step = self._with_cached_artifact(replace(step, key=data_digest(ingredients), ingredients=ingredients), whole)
         if step.artifact is None:
             why = [f"damaged: {step.damage}"] if step.damage else self._reasons(ingredients, former, ())
             step = replace(step, reasons=(*step.reasons, *why))
-        return self._resumed(step) if step.reasons else step
+        return self._with_resume_point(step) if step.reasons else step
 
-    def _looked_up(self, step: StagePlan, whole: bool) -> StagePlan:
+    def _with_cached_artifact(self, step: StagePlan, whole: bool) -> StagePlan:
         """The plan with the stored, undamaged artifact of its key, the reasons not to use it, and notes."""
         stage, notes = step.stage, list[str]()
         reasons = ["forced by --force"] if stage.name in self.options.force else []
@@ -130,10 +130,10 @@ class Planner:
                 reasons.append(text)
             if changed and self.options.on_code_change == "report":
                 notes.append(text)
-            notes.extend(self._looks(stage, artifact))
+            notes.extend(self._cosmetic_notes(stage, artifact))
         return replace(step, artifact=artifact, damage=damage, reasons=tuple(reasons), notes=tuple(notes))
 
-    def _resumed(self, step: StagePlan) -> StagePlan:
+    def _with_resume_point(self, step: StagePlan) -> StagePlan:
         """The plan of a stage that runs, with the earlier attempt or the artifact of a shorter run to resume."""
         stage, notes, expected, predecessor = step.stage, list(step.notes), step.expected, None
         record, forced = read_progress(self.store.runs.work / step.known_key), stage.name in self.options.force
@@ -169,7 +169,7 @@ class Planner:
             return ends[end]
         return None
 
-    def _looks(self, stage: Stage, artifact: Artifact) -> Iterator[str]:
+    def _cosmetic_notes(self, stage: Stage, artifact: Artifact) -> Iterator[str]:
         """Notes on cosmetic values that differ from those an artifact was made with; it is used unchanged."""
         for path, old, new in differences(artifact.recipe, self.loaded.recipe.model_dump(mode="json")):
             of_stage = any(path == part or path.startswith(f"{part}.") for part in stage.slice)
@@ -277,13 +277,13 @@ def _selected(loaded: LoadedRecipe, registry: Mapping[str, Stage], options: Opti
     return chosen
 
 
-def wrong_origin(loaded: LoadedRecipe, borrowed: Borrowed, text: str) -> RecipeError:
+def wrong_origin(loaded: LoadedRecipe, borrowed: ExternalInput, text: str) -> RecipeError:
     """The error that the recipe names an artifact which a stage cannot read."""
     path = borrowed.path
     return RecipeError([Problem(loaded.place(path), f"key '{path}' = {shown(borrowed.named)}: {text}")])
 
 
-def _origin(loaded: LoadedRecipe, borrowed: Borrowed, above: Sequence[Path]) -> LoadedRecipe | None:
+def _origin(loaded: LoadedRecipe, borrowed: ExternalInput, above: Sequence[Path]) -> LoadedRecipe | None:
     """The recipe of a borrowed artifact, if named by file. Raises `RecipeError` if that recipe does not fit."""
     if Path(borrowed.named).suffix not in SUFFIXES:
         return None

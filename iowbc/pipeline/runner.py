@@ -9,7 +9,7 @@ from pathlib import Path
 from socket import gethostname
 
 from iowbc.errors import Damaged, Interrupted, IowbcError, PipelineFailed
-from iowbc.full_disk import nothing_fits, what_is_full
+from iowbc.full_disk import is_disk_full, what_is_full
 from iowbc.pipeline.code import changed_code
 from iowbc.pipeline.console.display import Display, StageView
 from iowbc.pipeline.console.wording import short
@@ -99,7 +99,7 @@ class Runner:
                 self.artifacts[stage.name] = self._artifact(stage)
                 remember(self.store.runs, self.loaded, self.artifacts[stage.name])
         except Exception as error:
-            if isinstance(error, (PipelineFailed, Interrupted)) or not nothing_fits(error):
+            if isinstance(error, (PipelineFailed, Interrupted)) or not is_disk_full(error):
                 raise
             raise PipelineFailed(
                 f"{stage.name} failed: no space is left: {what_is_full(error, (self.store.runs.root,))}. "
@@ -225,7 +225,7 @@ class Runner:
             self._ended(workspace, "failed", "FAILED", str(error))
             raise PipelineFailed(f"{stage.name} failed: {error}") from error
         except Exception as error:
-            if nothing_fits(error):
+            if is_disk_full(error):
                 self._ended(workspace, "failed", "FAILED", "no space left")
                 raise
             details_file = workspace.root / "error.txt"

@@ -78,7 +78,7 @@ class Job:
 
 
 @dataclass(frozen=True)
-class Borrowed:
+class ExternalInput:
     """An artifact that another recipe makes."""
 
     path: str
@@ -131,7 +131,7 @@ class Stage:
     differs in nothing but a smaller one, as if it had never stopped."""
     extends_from: tuple[str, ...] = ()
     """Files needed to continue that artifact; if a published one lacks any, the stage starts from the beginning."""
-    borrows: Callable[[Recipe], Mapping[str, Borrowed]] = lambda recipe: {}
+    borrows: Callable[[Recipe], Mapping[str, ExternalInput]] = lambda recipe: {}
     """Artifacts that other recipes make, by their names among the job's inputs, for a given recipe."""
     counts: tuple[str, ...] = ()
     """Dotted recipe paths of numbers that the time it takes is proportional to."""

@@ -26,17 +26,17 @@ def estimated(
     made = closest.manifest
     rate_of = made.recipe if made.host == gethostname() else f"{made.recipe} on another machine"
     own = sorted((one for one in stored if one.manifest.host == gethostname()), key=lambda one: -one.manifest.made)
-    reckoned = (_reckoned(step.stage, one, ingredients) for one in own)
+    reckoned = (_scaled_time(step.stage, one, ingredients) for one in own)
     times = [seconds for seconds, alike in reckoned if alike][:LAST_RUNS]
     if not times:
-        guess = _reckoned(step.stage, closest, ingredients)[0]
+        guess = _scaled_time(step.stage, closest, ingredients)[0]
         return replace(step, roughly=guess, spread=UNSEEN, rate_of=rate_of)
     middle = median(times)
     spread = (UNSEEN[0] * min(times) / middle, UNSEEN[1] * max(times) / middle) if middle else UNSEEN
     return replace(step, expected=middle, spread=spread, rate_of=rate_of)
 
 
-def _reckoned(stage: Stage, former: Artifact, ingredients: Mapping[str, Any]) -> tuple[float, bool]:
+def _scaled_time(stage: Stage, former: Artifact, ingredients: Mapping[str, Any]) -> tuple[float, bool]:
     """The time that a stage takes at the rate of a stored artifact [s], which is proportional to each of the stage's
     counts, and whether nothing but seed and counts differs."""
     old, seconds = former.ingredients, former.manifest.seconds

@@ -16,7 +16,7 @@ from iowbc.files import read_limited
 from iowbc.recipe.section import COSMETIC, Section
 
 
-class FileBeside(Section):
+class EmbeddedFile(Section):
     """A file that a recipe names by a path relative to itself, with the file's embedded content."""
 
     suffixes: ClassVar[tuple[str, ...]] = ()
@@ -71,21 +71,21 @@ class FileBeside(Section):
         return {"anyOf": [{"type": "string", "description": "Path from the recipe's file."}, taken]}
 
 
-class ModuleFile(FileBeside):
+class ModuleFile(EmbeddedFile):
     """Python code. Reading a recipe or an artifact does not execute it, and neither do plans."""
 
     suffixes: ClassVar[tuple[str, ...]] = (".py",)
     largest: ClassVar[int] = 100_000
 
 
-class MeshFile(FileBeside):
+class MeshFile(EmbeddedFile):
     """Triangle mesh of an object. A few thousand triangles suffice, because collisions use their convex hull."""
 
     suffixes: ClassVar[tuple[str, ...]] = (".obj", ".stl")
     largest: ClassVar[int] = 400_000
 
 
-class OwnFunction(Section):
+class CustomFunction(Section):
     """A function in a user's Python file."""
 
     module: ModuleFile

@@ -10,7 +10,7 @@ from iowbc.recipe.evaluation.evaluation import Evaluation
 from iowbc.recipe.execution import Execution
 from iowbc.recipe.export import Export
 from iowbc.recipe.generator import ReferenceGenerator
-from iowbc.recipe.scene_names import misnamed
+from iowbc.recipe.scene_names import scene_name_problems
 from iowbc.recipe.section import Section
 from iowbc.recipe.simulation.simulation import SimulationSettings
 from iowbc.recipe.skill.skill import Skill
@@ -78,7 +78,7 @@ class Recipe(Section):
         if steps < 1 or abs(steps * step - period) > 1e-9:
             text = f"{step:g} s does not divide a control period of {period:g} s; take {period / max(1, steps):.6g} s"
             yield "simulation.physics.timestep", text
-        yield from misnamed(self)
+        yield from scene_name_problems(self)
 
     @field_validator("stages")
     @classmethod

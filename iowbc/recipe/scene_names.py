@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from iowbc.recipe.recipe import Recipe
 
 
-def misnamed(recipe: "Recipe") -> Iterator[tuple[str, str]]:
+def scene_name_problems(recipe: "Recipe") -> Iterator[tuple[str, str]]:
     """Invalid scene names and incomplete custom scenes: pairs of a dotted path and a message."""
     simulation, task, evaluation = recipe.simulation, recipe.task, recipe.eval
     worlds = {"simulation.scenes": simulation.scenes}

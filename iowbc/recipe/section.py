@@ -60,7 +60,7 @@ DEEPEST = 16
 """Largest number of hidden layers of a network."""
 OWN_NAME = "[a-z][a-z0-9_]{0,31}"
 """Pattern of the name of a custom scene or reward term."""
-OwnName = Annotated[str, Field(pattern=f"^{OWN_NAME}$")]
+CustomName = Annotated[str, Field(pattern=f"^{OWN_NAME}$")]
 
 
 class Section(BaseModel):
@@ -78,9 +78,9 @@ class Section(BaseModel):
         return iter(())
 
     @model_validator(mode="after")
-    def _values_fit_each_other(self) -> Self:
+    def _check_consistency(self) -> Self:
         if found := tuple(self.problems()):
-            raise Unfitting(found)
+            raise InconsistentValues(found)
         return self
 
     @classmethod
@@ -167,7 +167,7 @@ def sentences(section: type[BaseModel]) -> dict[str, str]:
     return {name: sentence for base in bases for name, sentence in sentences(base).items()} | own
 
 
-class Unfitting(ValueError):
+class InconsistentValues(ValueError):
     """Inconsistent values of a section; see `Section.problems`."""
 
     def __init__(self, problems: tuple[tuple[str, str], ...]) -> None:

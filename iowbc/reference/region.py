@@ -26,7 +26,7 @@ class LabelledRegion:
 
 
 @dataclass(frozen=True)
-class GentleRegion:
+class SmoothRegion:
     """Map of the commands with labels and a smooth reference, and its data on the grid (pitches, heights)."""
 
     map: FeasibleMap
@@ -52,7 +52,7 @@ def measure_labelled_region(plan: SamplePlan, dataset: Dataset) -> LabelledRegio
     )
 
 
-def measure_gentle_region(plan: SamplePlan, held: FeasibleMap, network: ReferenceNetwork, arms: Array) -> GentleRegion:
+def measure_smooth_region(plan: SamplePlan, held: FeasibleMap, network: ReferenceNetwork, arms: Array) -> SmoothRegion:
     """Part of a map where the network moves smoothly with height and pitch, for arms (n, 14).
 
     Raises ValueError if it is empty.
@@ -73,7 +73,7 @@ def measure_gentle_region(plan: SamplePlan, held: FeasibleMap, network: Referenc
             jump[row, column] = np.quantile(np.maximum(lower, leaner), recipe.gentle_share)
     height, pitch = np.meshgrid(plan.heights, plan.pitches)
     feasible = held.contains(height, pitch) & (jump <= recipe.jump)
-    return GentleRegion(build_map(plan.pitches, plan.heights, feasible, recipe.bound_slope, plan.nominal), jump)
+    return SmoothRegion(build_map(plan.pitches, plan.heights, feasible, recipe.bound_slope, plan.nominal), jump)
 
 
 def _around(plan: SamplePlan, command: Array) -> Array:

@@ -112,13 +112,13 @@ class Tree:
         mover = self.mover(self.body_of_site(site).name)
         return mover, self.forward({}, mover.name, site)[0]
 
-    def burden(self, name: str) -> tuple[float, Array]:
+    def rigid_mass(self, name: str) -> tuple[float, Array]:
         """Mass [kg] of a body with all that is fixed to it, and their first moment in its frame, (3,) [kg·m]."""
         body = self.bodies[name]
         mass, moment = body.mass, body.mass * body.centre
         for child in self.bodies.values():
             if child.parent == name and child.hinge is None:
-                more, further = self.burden(child.name)
+                more, further = self.rigid_mass(child.name)
                 mass += more
                 moment = moment + more * child.position + rotations.matrix(child.quaternion) @ further
         return mass, moment

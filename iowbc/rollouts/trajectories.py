@@ -11,7 +11,7 @@ from iowbc.arrays import Array, Mask
 from iowbc.rollouts.rollout_policies import RolloutPolicy
 
 
-class Stepped(Protocol):
+class StepBuffers(Protocol):
     """n environments that read actions from their buffers and write the results there."""
 
     @property
@@ -45,7 +45,7 @@ class Trajectories:
     """Time spent in the policy [s], mean over parallel workers."""
 
 
-def roll(environments: Stepped, rollout_policy: RolloutPolicy, steps: int) -> Trajectories:
+def roll(environments: StepBuffers, rollout_policy: RolloutPolicy, steps: int) -> Trajectories:
     """Make a rollout of `steps` steps. Raises ValueError if an action is not finite."""
     buffers, acting = environments.buffers, 0.0
     observations, actions, rewards, ends = [], [], [], []

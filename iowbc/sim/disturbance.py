@@ -52,10 +52,10 @@ class Disturbance:
             self.force[over] = 0.0
             self._until[over] = 0
         if due.any():
-            self._strike(np.flatnonzero(due), step, key, scale)
+            self._start_impulse(np.flatnonzero(due), step, key, scale)
         return self.force
 
-    def _strike(self, which: Indices, step: Indices, key: Keys, scale: Array) -> None:
+    def _start_impulse(self, which: Indices, step: Indices, key: Keys, scale: Array) -> None:
         self._count[which] += 1
         blow = random.absorb(key[which], self._count[which])
         size = random.draw(blow, f"{self._name}/size", self._size)[:, 0]

@@ -77,13 +77,15 @@ class Draws:
             elif name == "object_ground_friction":
                 self._present[~self._pushing, place] = 0.0
         self._rows = np.tile(self._table.nominal, (n, 1))
-        self._habits = DrawTable(_habits(recipe.partner))
-        self._habit_rows = np.tile(self._habits.nominal, (n, 1))
+        self._behaviour_distributions = DrawTable(_behaviour_distributions(recipe.partner))
+        self._habit_rows = np.tile(self._behaviour_distributions.nominal, (n, 1))
         chances = np.array([share for _, share in recipe.partner.behaviours])
         self._behaviours = np.cumsum(chances)[:-1] / chances.sum()
         self.values: dict[str, Array] = {name: np.ones(n) for name in SWITCHES}
         self.values["partner_behaviour"] = np.zeros(n)
-        self.values |= {name: self._habit_rows[:, place.start] for name, place in self._habits.columns.items()}
+        self.values |= {
+            name: self._habit_rows[:, place.start] for name, place in self._behaviour_distributions.columns.items()
+        }
         for name, place in self._table.columns.items():
             if name != PUSH_SHARE:
                 single = place.stop - place.start == 1
@@ -105,14 +107,14 @@ class Draws:
             values[name][which] = 1.0
         if not self.recipe.sensing.enabled:
             values["noise_scale"][which] = 0.0
-        self._habit_rows[which] = self._habits.draw(key, "partner")
+        self._habit_rows[which] = self._behaviour_distributions.draw(key, "partner")
         chance = random.uniform(key, "partner/behaviour", 1)[:, 0]
         values["partner_behaviour"][which] = np.searchsorted(self._behaviours, chance, side="right")
         row = self._table.draw(key, "episode")
         share, push_share = self._table.columns["partner_share"], self._table.columns[PUSH_SHARE]
         pushing = self._pushing[which]
         row[pushing, share] = row[pushing, push_share]
-        self._draw_uncommon(row, key)
+        self._draw_rare_cases(row, key)
         self._rows[which] = row
         for name, held in fixed.items():
             if name != "object_mass":
@@ -132,7 +134,7 @@ class Draws:
         values["grip_shift"][which] = np.minimum(borne / (1.0 - borne) * self._far[which], self._near[which])
         values["slip_force"][which] = values["surface_friction"][which] * self._strength[which]
 
-    def _draw_uncommon(self, row: Array, key: Keys) -> None:
+    def _draw_rare_cases(self, row: Array, key: Keys) -> None:
         """Makes objects light and both latencies long in a share of the episodes; rows (k, width)."""
         settings = self.recipe.randomization
         if not settings.enabled or not (settings.light_share or settings.slow_share):
@@ -170,7 +172,7 @@ def _entries(recipe: Recipe, robot: Robot) -> dict[str, tuple[Distribution, int]
     return entries
 
 
-def _habits(partner: PartnerSettings) -> dict[str, tuple[Distribution, int]]:
+def _behaviour_distributions(partner: PartnerSettings) -> dict[str, tuple[Distribution, int]]:
     """Distributions of the partner's behaviours, in a separate table, so that they do not change the other draws."""
     sections = {"leader": partner.leader, "stopping": partner.stopping}
     return {

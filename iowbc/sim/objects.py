@@ -14,7 +14,7 @@ from iowbc.sim.timing import Timing
 OBJECT_BIT = 4
 HANDS = ("left_hand", "right_hand")
 """Bodies without mass at the grip points, through which all forces between hands and object pass."""
-WEIGHTLESS = 1e-9
+NEGLIGIBLE_MASS = 1e-9
 """Mass [kg] and inertia [kg·m²] of those bodies."""
 OFF_CENTRE = [0.001, 0.001, 0.001]
 """Centre of mass before one is drawn [m]; off the centre, because the compiler hard-codes a centred one."""
@@ -71,7 +71,7 @@ def add_object(
 def _add_hands(spec: Any, robot: Robot, timing: Timing) -> None:
     """The hands, each with a sensor of the force that passes through it, with a history of one control period."""
     for name, wrist, place in zip(HANDS, robot.wrist_bodies, robot.grip_offset, strict=True):
-        inertial = {"mass": WEIGHTLESS, "inertia": [WEIGHTLESS] * 3}
+        inertial = {"mass": NEGLIGIBLE_MASS, "inertia": [NEGLIGIBLE_MASS] * 3}
         hand = spec.body(wrist).add_body(name=name, pos=place, explicitinertial=True, **inertial)
         hand.add_site(name=name, group=4)
         spec.add_sensor(

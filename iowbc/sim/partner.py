@@ -24,10 +24,10 @@ FEED = 4
 """Entries of the command that the partner receives: v_x, v_y, yaw rate, height."""
 SLOW = 0.1
 """Speed of a crate below which a follower's push fades out [m/s]."""
-HESITANT = 0.03
+FOLLOWER_FADE_SPEED = 0.03
 """Speed set for a crate below which a steered partner's push fades out [m/s]."""
 PATH, FOLLOWER, LEADER, STOPPING, TUGGING, LAGGING = range(len(BEHAVIOURS))
-REMEMBERED = (
+STATE_FIELDS = (
     *("stiffness", "damping", "weight", "resistance", "bound", "pace", "gust", "drift", "share", "wandering"),
     *("present", "height", "heading", "offset", "aim", "unsteady", "centre", "at", "speed", "arm", "force", "energy"),
     *("behaviour", "steps", "turning", "sideways", "rise", "stop", "halted", "followed", "attention", "slow"),
@@ -162,7 +162,7 @@ class Partner:
         state.partner_velocity[:] = velocity * self._present[:, None]
         along = velocity[:, :2] / (_length(velocity) + self._slow)[:, None]
         if self._steers:
-            own = self._own_way / (_length(self._own_way) + HESITANT)[:, None]
+            own = self._own_way / (_length(self._own_way) + FOLLOWER_FADE_SPEED)[:, None]
             along = np.where(self.steered[:, None], own, along)
         lead = self._aim + velocity * self._period - self._at
         lead[:, :2] *= np.minimum(1.0, self._recipe.leash / (_length(lead) + TINY))[:, None]
@@ -314,7 +314,7 @@ class Partner:
         return self._aim.copy()
 
     def arrays(self) -> dict[str, Array]:
-        own = {name: getattr(self, f"_{name}") for name in REMEMBERED}
+        own = {name: getattr(self, f"_{name}") for name in STATE_FIELDS}
         return own | {f"line/{name}": values for name, values in self._line.arrays().items()}
 
     def restored(self) -> None:

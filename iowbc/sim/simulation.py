@@ -203,7 +203,7 @@ class Simulation:
         wrench[:, :3] += self._impulses.advance(self.clock, self._episode_key, drawn["impulse_scale"])
         if self.planned_impulse.any():
             wrench[:, :3] += self.planned_impulse
-        self._hand_over(wrench)
+        self._handover_force(wrench)
         push = self._pushes.advance(self.clock, self._episode_key, drawn["push_scale"])
         np.multiply(push, self._robot_mass[:, None], out=state.push_force)
         np.add(state.push_force, self.planned_push, out=state.push_force)
@@ -240,7 +240,7 @@ class Simulation:
         self.clock += 1
         self._deliver()
 
-    def _hand_over(self, wrench: Array) -> None:
+    def _handover_force(self, wrench: Array) -> None:
         """Supports the robot's share of a held object's weight between the hands, fading out over T: f = (1 - share) m
         g (1 - t / T)."""
         if (self.clock < self._handover).any():

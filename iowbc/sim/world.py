@@ -37,7 +37,7 @@ FEET, HANDS, THING = slice(0, 2), slice(2, 4), 4
 """Places of the bodies whose forces are kept."""
 AT_LIMIT = 0.999
 """Part of the torque limit at which a motor counts as saturated."""
-PRESSED = 0.001
+PALM_OVERLAP = 0.001
 """Depth by which palms start inside the object that they squeeze [m]."""
 
 
@@ -162,7 +162,7 @@ class World:
             self.fields.place_grips(ids, in_heading - middle[:, None])
         else:
             between = in_heading[:, 0, 1] - in_heading[:, 1, 1]
-            self.fields.fit_width(ids, between - 2.0 * (radius - PRESSED))
+            self.fields.fit_width(ids, between - 2.0 * (radius - PALM_OVERLAP))
 
     def step(self, given: Period, diverged: Mask) -> None:
         """One control period. Marks in `diverged` the simulations that diverged, and restores their state before it."""

@@ -13,7 +13,7 @@ from iowbc.task.specification import Specification
 
 SOLVED, UNSOLVED = 0.8, 0.2
 """Lowest success rate of the reference pair, and highest of a lone or passive robot."""
-DRAGGED = 1.5
+MIN_FORCE_RATIO = 1.5
 """Least ratio of the partner force with a passive robot to that of the reference pair at which the passive robot may
 succeed. A compliant controller can be led while commanded to stand; only the force shows that it does not help."""
 PAIRS: dict[str, tuple[str, Rule]] = {
@@ -42,7 +42,7 @@ class Admission:
         found = []
         if self.success["reference"] < SOLVED:
             found.append(f"the reference pair solves {self.success['reference']:.0%}, expected {SOLVED:.0%} or more")
-        led = self.force["passive robot"] >= DRAGGED * self.force["reference"]
+        led = self.force["passive robot"] >= MIN_FORCE_RATIO * self.force["reference"]
         for pair in ("lone robot",) if led else ("lone robot", "passive robot"):
             if self.success[pair] > UNSOLVED:
                 found.append(f"with a {pair} {self.success[pair]:.0%} succeed, expected {UNSOLVED:.0%} or less")

@@ -7,11 +7,11 @@ import numpy as np
 from iowbc.arrays import Array, Mask
 from iowbc.control.command import HEIGHT, OFFSET, YAW_RATE
 from iowbc.control.skill_command import SkillCommand
-from iowbc.recipe.skill.skill import Pursuit, Skill
+from iowbc.recipe.skill.skill import PathFollowing, Skill
 from iowbc.recipe.task.commands import Commands
 from iowbc.robot.rotations import wrapped
 from iowbc.skill.path import Paths
-from iowbc.skill.situation import Situation, turned
+from iowbc.skill.situation import GameState, turned
 
 
 @dataclass(frozen=True)
@@ -28,20 +28,24 @@ class ObjectMotion:
     """Height of the path a little ahead, (n,) [m]."""
 
 
-def pursue(settings: Pursuit, paths: Paths, now: Situation) -> ObjectMotion:
+def pursue(settings: PathFollowing, paths: Paths, now: GameState) -> ObjectMotion:
     """v = v_0 min(1, remaining length / slowing) t - k e n: tangent t, normal n, distance e from the path."""
     speed = settings.speed * np.minimum(1.0, now.left / settings.slowing)
     return _along(settings, paths, now, now.covered, speed, -settings.lateral * now.lateral)
 
 
-def by_the_clock(settings: Pursuit, paths: Paths, now: Situation, seconds: Array, pace: Array | float) -> ObjectMotion:
+def open_loop_motion(
+    settings: PathFollowing, paths: Paths, now: GameState, seconds: Array, pace: Array | float
+) -> ObjectMotion:
     """Open-loop motion along the path at `pace` (n,) times the nominal speed; `seconds` (n,) since the start."""
     covered = settings.speed * pace * seconds
     speed = settings.speed * pace * (covered < paths.length[now.path])
     return _along(settings, paths, now, covered, speed, np.zeros(len(seconds)))
 
 
-def _along(settings: Pursuit, paths: Paths, now: Situation, covered: Array, speed: Array, aside: Array) -> ObjectMotion:
+def _along(
+    settings: PathFollowing, paths: Paths, now: GameState, covered: Array, speed: Array, aside: Array
+) -> ObjectMotion:
     heading = paths.heading(now.path, covered)
     cosine, sine = np.cos(heading), np.sin(heading)
     return ObjectMotion(
@@ -60,7 +64,7 @@ class NominalCommand(SkillCommand):
         super().__init__(skill.robot, commands, pushing)
         self._pursuit = skill.pursuit
 
-    def leading(self, wanted: ObjectMotion, now: Situation) -> Array:
+    def leading(self, wanted: ObjectMotion, now: GameState) -> Array:
         """Commands for the desired motion of the object; the base circles the object's centre as it turns.
 
         v_base = v_object - ω × (object - base), in the heading frame. The hands rise by the path's height plus the
@@ -95,7 +99,7 @@ class Human:
         """Resets some humans, (k,)."""
         self._velocity[which], self._height[which], self._offset[which] = 0.0, 0.0, 0.0
 
-    def of_action(self, action: Array, now: Situation) -> Array:
+    def of_action(self, action: Array, now: GameState) -> Array:
         """Intentions that actions add to the script's, (n, 5): velocity [m/s], yaw rate [rad/s], height offset [m].
         `action` (n, 5) in [-1, 1]: velocity of the handle in the frame of the object's yaw, height offset, yaw rate of
         the object."""
@@ -103,7 +107,7 @@ class Human:
         scaled = action * np.array([s.velocity, s.velocity, s.vertical_velocity, s.height, s.yaw_rate])
         return np.concatenate([turned(scaled[:, :3], now.yaw), scaled[:, 4:], scaled[:, 3:4]], axis=1)
 
-    def of_script(self, wanted: ObjectMotion, now: Situation) -> Array:
+    def of_script(self, wanted: ObjectMotion, now: GameState) -> Array:
         """Intentions (n, 5) for the desired motion of the object; the handle circles its centre as it turns."""
         rate = wanted.yaw_rate + self._pursuit.yaw * wrapped(wanted.heading - now.yaw)
         arm = now.handle - now.position
@@ -116,7 +120,7 @@ class Human:
         """Sets intentions (n, 5) until the next decision."""
         self._velocity, self._offset = intentions[:, :4], intentions[:, 4]
 
-    def reach(self, which: Mask, away: Array, now: Situation) -> None:
+    def reach(self, which: Mask, away: Array, now: GameState) -> None:
         """Moves the springs of some humans, (n,), towards hands at the offset `away` (n, 3) [m] (start frame), at most
         as fast as the human agent. The object's yaw is left to the robot."""
         s = self._settings

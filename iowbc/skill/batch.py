@@ -11,13 +11,13 @@ from iowbc.control.skill_observation import YAW, joined, of_object, robot_observ
 from iowbc.rollouts.blocks import block_size
 from iowbc.sim.shapes import measured as shape_of
 from iowbc.skill import observation as seen
-from iowbc.skill.agents import Human, NominalCommand, ObjectMotion, by_the_clock, pursue
+from iowbc.skill.agents import Human, NominalCommand, ObjectMotion, open_loop_motion, pursue
 from iowbc.skill.figures import FIGURES, EpisodeFigures, internal_force
 from iowbc.skill.lower_layer import LowerLayer
 from iowbc.skill.path import Paths
 from iowbc.skill.plan import CLOCK, KINDS, PERSON, RULES, EpisodeDraws
 from iowbc.skill.reward import GameEnding, ending, potential, reward
-from iowbc.skill.situation import Origin, Situation, situation, turned
+from iowbc.skill.situation import GameState, Origin, situation, turned
 from iowbc.task.episodes import Episode
 from iowbc.task.vector.shared import Buffers
 
@@ -69,7 +69,7 @@ class GameBatch:
         self._costs, self._jerk = np.zeros((3, n)), np.zeros(n)
         self.hand = np.full((n, 3), np.nan)
         """Hand positions of persons, which pull the handle there, world frame, (n, 3) [m]; NaN lets go."""
-        self.now: Situation
+        self.now: GameState
         """The games after the last control step."""
 
     def reset(self, seeds: Keys | None = None, agent_share: float = 0.0) -> None:
@@ -90,7 +90,7 @@ class GameBatch:
         self.decide()
         for _ in range(self.substeps):
             self.control()
-        self.conclude()
+        self.finish_decision()
 
     def decide(self) -> None:
         action = {name: self.buffers[f"action/{name}"].astype(np.float64).clip(-1.0, 1.0) for name in self._action}
@@ -114,7 +114,7 @@ class GameBatch:
         self.now = self._situation(self.now.covered)
         self._costs += self._costs_now()
 
-    def conclude(self) -> None:
+    def finish_decision(self) -> None:
         """Reward and endings of the decision; restarts ended games."""
         self._decisions += 1
         lower, buffers, held = self.lower, self.buffers, ~self._pushing
@@ -170,7 +170,7 @@ class GameBatch:
             action[which] = 0.0
         self.buffers["human_acts"][:] = self.drawn.acts
 
-    def _situation(self, covered: Array) -> Situation:
+    def _situation(self, covered: Array) -> GameState:
         lower = self.lower
         return situation(lower.simulation, lower.moved, self.origin, self.paths, self.drawn.task, covered)
 
@@ -180,7 +180,7 @@ class GameBatch:
         by_rule = {
             "lead": nominal.leading(pursue(self._skill.pursuit, self.paths, self.now), self.now),
             "follow": nominal.following(self._felt[:, -1].sum(axis=1), yaw),
-            "clock": nominal.leading(self._by_the_clock(1.0), self.now),
+            "clock": nominal.leading(self._open_loop_motion(1.0), self.now),
             "stand": nominal.standing(),
         }
         unaware = (self.drawn.rule == RULES.index("follow"))[:, None]
@@ -190,13 +190,15 @@ class GameBatch:
     def _intentions(self, action: Array) -> Array:
         """Intentions of the humans, (n, 5)."""
         led = self._human.of_script(pursue(self._skill.pursuit, self.paths, self.now), self.now)
-        blind = self._human.of_script(self._by_the_clock(self.drawn.pace), self.now)
+        blind = self._human.of_script(self._open_loop_motion(self.drawn.pace), self.now)
         scripted = np.where((self.drawn.kind == KINDS.index(CLOCK))[:, None], blind, led)
         acting = led + self._human.of_action(action, self.now)
         return np.where(self.drawn.acts[:, None], acting, scripted)
 
-    def _by_the_clock(self, pace: Array | float) -> ObjectMotion:
-        return by_the_clock(self._skill.pursuit, self.paths, self.now, self._decisions / self._skill.frequency, pace)
+    def _open_loop_motion(self, pace: Array | float) -> ObjectMotion:
+        return open_loop_motion(
+            self._skill.pursuit, self.paths, self.now, self._decisions / self._skill.frequency, pace
+        )
 
     def _costs_now(self) -> Array:
         """Internal force [N], absolute power of the human beyond its share [W] and tilt [rad], (3, n)."""
@@ -234,7 +236,9 @@ class GameBatch:
             *(self._pushing, drawn.known, path, self._felt),
         )
         force = self.origin.turned(lower.simulation.state.partner_force)
-        felt = seen.felt_by_human(now, force, self._action["human"], seen.waypoints(self.paths, now, ahead, now.yaw))
+        felt = seen.human_observation(
+            now, force, self._action["human"], seen.waypoints(self.paths, now, ahead, now.yaw)
+        )
         left = (self._limit[drawn.task] - self._decisions) / self._skill.frequency
         secret = seen.hidden(lower.simulation, lower.moved, left, drawn.acts)
         human = joined(felt)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from iowbc.arrays import Array, Indices
-from iowbc.skill.situation import Situation
+from iowbc.skill.situation import GameState
 
 HIGH = 90.0
 """Percentile of the partner's force."""
@@ -32,7 +32,7 @@ class EpisodeFigures:
         for values in (self._steps, self._sum, self._most):
             values[which] = 0
 
-    def add(self, now: Situation, internal: Array, partner: Array, power: Array, loads: Array, period: float) -> None:
+    def add(self, now: GameState, internal: Array, partner: Array, power: Array, loads: Array, period: float) -> None:
         """Adds a control step: internal force (n,) [N], the partner's horizontal force (n, 2) [N], its absolute power
         beyond its share (n,) [W], and the loads on the robot and on both, (n, 2) [N]."""
         rows = np.arange(len(internal))

@@ -97,7 +97,7 @@ class SkillTraining:
             observed = outcome.observed
         rows = {name: np.stack(values) for name, values in kept.items()}
         if not self.steps:  # policies with an output of zero do not depend on it
-            self._take_in(rows)
+            self._update_statistics(rows)
             self._move()
         prepared = {name: each.prepared(rows[name]) for name, each in self.trained.items()}
         for step, places, behind in cut:
@@ -118,10 +118,10 @@ class SkillTraining:
             own = {"input": prepared[name], "action": action, "mean": mean, "log_density": density}
             samples |= {f"{name}/{part}": values for part, values in own.items()}
         if self.steps:
-            self._take_in(rows)
+            self._update_statistics(rows)
         return {name: values.flatten(0, 1).clone() for name, values in samples.items()}, _of_episodes(episodes)
 
-    def _take_in(self, rows: Mapping[str, Array]) -> None:
+    def _update_statistics(self, rows: Mapping[str, Array]) -> None:
         """Update the normalisation statistics with the networks' inputs, (T, n, k) each."""
         for name, each in self.trained.items():
             each.normalization.observe(rows[name].reshape(-1, rows[name].shape[-1]))

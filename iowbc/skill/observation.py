@@ -9,7 +9,7 @@ from iowbc.recipe.skill.skill import Skill
 from iowbc.robot.rotations import wrapped
 from iowbc.sim.simulation import Simulation
 from iowbc.skill.path import Paths
-from iowbc.skill.situation import Situation, turned
+from iowbc.skill.situation import GameState, turned
 from iowbc.task.motion import Motion
 
 DRAWN = {"partner_stiffness": 300.0, "partner_damping": 50.0, "partner_delay": 0.3, "partner_noise": 8.0}
@@ -27,7 +27,7 @@ def sizes(skill: Skill) -> tuple[tuple[str, int], ...]:
     return ("robot", robot), ("human", FELT), ("state", robot + FELT + HIDDEN)
 
 
-def waypoints(paths: Paths, now: Situation, ahead: tuple[float, float], heading: Array) -> Array:
+def waypoints(paths: Paths, now: GameState, ahead: tuple[float, float], heading: Array) -> Array:
     """Next points of the path relative to the object's centre, in a frame with a heading (n,) [rad]: x, y, heading and
     relative height of each, then the remaining length. (n, 9)."""
     columns = []
@@ -39,7 +39,7 @@ def waypoints(paths: Paths, now: Situation, ahead: tuple[float, float], heading:
     return np.concatenate([*columns, now.left[:, None] / TIME], axis=1)
 
 
-def felt_by_human(now: Situation, force: Array, action: Array, ahead: Array) -> dict[str, Array]:
+def human_observation(now: GameState, force: Array, action: Array, ahead: Array) -> dict[str, Array]:
     """Human observation in the frame of the object's yaw. `force` (n, 3): on the object, start frame [N]; `action` (n,
     5): its last one; `ahead` (n, 9): its waypoints."""
     return {

@@ -6,7 +6,7 @@ import numpy as np
 
 from iowbc.arrays import Array, Mask
 from iowbc.recipe.skill.skill import Skill
-from iowbc.skill.situation import Situation
+from iowbc.skill.situation import GameState
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class GameEnding:
 
 
 def ending(
-    skill: Skill, now: Situation, *, held: Mask, happened: tuple[Mask, Mask, Mask], touched: Mask, late: Mask
+    skill: Skill, now: GameState, *, held: Mask, happened: tuple[Mask, Mask, Mask], touched: Mask, late: Mask
 ) -> GameEnding:
     """Endings of games, (n,) each. `held`: object in the hands; `happened`: falls, drops and divergence; `touched`:
     walls; `late`: past the time limit."""
@@ -51,7 +51,7 @@ def ending(
     return GameEnding(success, fell, lost, walls, strayed, diverged, late & ~over)
 
 
-def potential(skill: Skill, now: Situation, held: Mask) -> Array:
+def potential(skill: Skill, now: GameState, held: Mask) -> Array:
     """Potential Φ = progress · s - path |e| - yaw |ψ| - height |z| with the arc length s, (n,)."""
     weights = skill.reward
     value: Array = weights.progress * now.covered - weights.path * np.abs(now.lateral)

@@ -26,7 +26,7 @@ class Origin:
 
 
 @dataclass(frozen=True)
-class Situation:
+class GameState:
     """n games at one time; positions and vectors in the start frame."""
 
     path: Indices
@@ -63,14 +63,14 @@ class Situation:
 
 def situation(
     simulation: Simulation, moved: Motion, origin: Origin, paths: Paths, path: Indices, covered: Array
-) -> Situation:
+) -> GameState:
     """State after a control step; `covered` (n,): arc length at an earlier time [m]."""
     state = simulation.state
     position = origin.turned(state.object_position - origin.position)
     forward, up = (rotate(state.object_quaternion, np.tile(axis, (simulation.n, 1))) for axis in np.eye(3)[::2])
     yaw = wrapped(np.arctan2(forward[:, 1], forward[:, 0]) - origin.heading)
     covered, lateral = paths.place(path, position[:, :2], covered)
-    return Situation(
+    return GameState(
         path=path,
         position=position,
         velocity=origin.turned(state.object_linear_velocity),

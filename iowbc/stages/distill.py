@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 
-from iowbc.pipeline.stage import Borrowed, Job, Presentation, Stage
+from iowbc.pipeline.stage import ExternalInput, Job, Presentation, Stage
 from iowbc.recipe.recipe import Recipe
 from iowbc.stages.inputs import generator_stage, not_privileged
 from iowbc.stages.training import rolls_elsewhere, train
@@ -110,7 +110,7 @@ STAGE = Stage(
     slice=("seed", "rg.height", "simulation", "task", "teacher.symmetry", "teacher.normalization_clip", "distill"),
     reads=lambda recipe: (*generator_stage(recipe), *(() if recipe.distill.experts else ("teacher",))),
     borrows=lambda recipe: {
-        f"expert/{scene}": Borrowed(f"distill.experts.{scene}", named, "teacher")
+        f"expert/{scene}": ExternalInput(f"distill.experts.{scene}", named, "teacher")
         for scene, named in recipe.distill.experts.items()
     },
     run=run,

@@ -31,7 +31,7 @@ def run(job: Job) -> None:
 
     from iowbc.deploy import contract, exported_folder
     from iowbc.deploy.timing import step_seconds
-    from iowbc.evaluation.acceptance import golden_inputs, try_out, try_out_network
+    from iowbc.evaluation.acceptance import golden_inputs, run_acceptance, try_out_network
     from iowbc.export import golden
     from iowbc.export.folder import write_folder
     from iowbc.learning.acting import policy_of
@@ -45,7 +45,7 @@ def run(job: Job) -> None:
     statement = write_folder(job.out, graph, job.recipe, rg, sources)
     try:
         world = Specification(job.recipe, job.robot, rg).deployed
-        policy, played = try_out(world, job.out, job.interrupted)
+        policy, played = run_acceptance(world, job.out, job.interrupted)
         by_torch = try_out_network(world, policy_of(student, about["architecture"]), job.interrupted)
         steps = golden_inputs(world, job.out, job.interrupted)
     except Interrupted as stopped:

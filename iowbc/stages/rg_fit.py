@@ -14,12 +14,12 @@ def run(job: Job) -> None:
     from iowbc.control.feasible_map import FeasibleMap
     from iowbc.control.generator import ReferenceNetwork
     from iowbc.reference.fit.fitting import fit
-    from iowbc.reference.fit.gates import judge_fit, measure_jumps
+    from iowbc.reference.fit.gates import check_fit, measure_jumps
     from iowbc.reference.fit.preparation import prepare
     from iowbc.reference.labels.dataset import Dataset
     from iowbc.reference.labels.plan import SamplePlan
     from iowbc.reference.pictures.figures import error_figures, gentle_figure, learning_figure
-    from iowbc.reference.region import measure_gentle_region
+    from iowbc.reference.region import measure_smooth_region
     from iowbc.robot.description import load_robot
 
     rg, source = job.recipe.rg, job.inputs["rg-dataset"]
@@ -40,7 +40,7 @@ def run(job: Job) -> None:
     plan = SamplePlan(robot, rg, job.recipe.seed)
     learnt = prepared.training[dataset.index[prepared.training] < plan.drawn]
     try:
-        region = measure_gentle_region(plan, labelled, network, dataset.arm[learnt])
+        region = measure_smooth_region(plan, labelled, network, dataset.arm[learnt])
     except ValueError as error:
         raise StageFailed(f"{error}; or raise rg.feasible.jump") from error
     feasible = region.map
@@ -50,7 +50,7 @@ def run(job: Job) -> None:
     predicted = network(dataset.arm[held], dataset.command[held])
     errors = prepared.kinematics.errors([prepared.samples[i] for i in held], predicted.astype(np.float64))
     jumps = measure_jumps(network, rg, feasible, dataset.arm[held], job.recipe.seed)
-    verdict = judge_fit(rg.fit.gates, dataset, held, predicted, errors, jumps)
+    verdict = check_fit(rg.fit.gates, dataset, held, predicted, errors, jumps)
     samples = {"training": len(prepared.train.inputs), "held_out": len(held), "best_epoch": fitted.epochs}
     job.summarize(verdict.metrics, gates=verdict.gates, worst=verdict.worst, samples=samples)
     job.report.metrics(verdict.metrics, fitted.epochs)

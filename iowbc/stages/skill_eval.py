@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
-from iowbc.pipeline.stage import Borrowed, Job, Presentation, Stage
+from iowbc.pipeline.stage import ExternalInput, Job, Presentation, Stage
 from iowbc.recipe.recipe import Recipe
 from iowbc.results.frame import write_frame
 from iowbc.stages.inputs import generator_stage, leaves_student, policy_stage
@@ -41,15 +41,15 @@ def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
             yield f"skill.eval.masses.{scene}", f"no task of the evaluation has this scene; valid: {', '.join(scenes)}"
 
 
-def borrows(recipe: Recipe) -> Mapping[str, Borrowed]:
+def borrows(recipe: Recipe) -> Mapping[str, ExternalInput]:
     """Skills that other recipes train, and controllers with their reference generators."""
     skills = {
-        f"{label}/{place}": Borrowed(f"skill.eval.others.{label}", named, "skill")
+        f"{label}/{place}": ExternalInput(f"skill.eval.others.{label}", named, "skill")
         for label, several in recipe.skill.eval.others.items()
         for place, named in enumerate(several)
     }
     return skills | {
-        f"{label}/{stage}": Borrowed(f"skill.eval.controllers.{label}", named, stage)
+        f"{label}/{stage}": ExternalInput(f"skill.eval.controllers.{label}", named, stage)
         for label, named in recipe.skill.eval.controllers.items()
         for stage in ("rg-fit", "distill")
     }

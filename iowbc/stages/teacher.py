@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from iowbc.errors import StageFailed
 from iowbc.learning.curves import TABLE
-from iowbc.pipeline.stage import START, Borrowed, Job, Presentation, Stage
+from iowbc.pipeline.stage import START, ExternalInput, Job, Presentation, Stage
 from iowbc.recipe.recipe import Recipe
 from iowbc.stages.inputs import generator_stage, not_privileged
 from iowbc.stages.training import STATE, leave_extendable, rolls_elsewhere, train
@@ -51,11 +51,11 @@ def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
         yield from taken_names(recipe.task.observation)
 
 
-def borrows(recipe: Recipe) -> Mapping[str, Borrowed]:
+def borrows(recipe: Recipe) -> Mapping[str, ExternalInput]:
     """The teacher or student that training begins from."""
     path, named = recipe.teacher.beginning
     stage = "teacher" if path == "teacher.start" else "distill"
-    return {} if named is None else {START: Borrowed(path, named, stage)}
+    return {} if named is None else {START: ExternalInput(path, named, stage)}
 
 
 def run(job: Job) -> None:

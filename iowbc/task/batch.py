@@ -11,7 +11,7 @@ from iowbc.control import gait
 from iowbc.control.action import action_scale
 from iowbc.control.command import HEIGHT, OFFSET, VELOCITY
 from iowbc.control.layout import EVERY
-from iowbc.control.observation import Sensed
+from iowbc.control.observation import PolicyInputs
 from iowbc.recipe.simulation.holding import FREE
 from iowbc.robot.description import load_robot
 from iowbc.sim.simulation import Simulation
@@ -213,7 +213,7 @@ class Batch:
         memory, simulation, layout = self.memory, self.simulation, self.layout
         self._joint_reference[:, self._support] = memory.support
         self._joint_reference[:, self._arms] = memory.arms
-        sensed = Sensed(
+        sensed = PolicyInputs(
             measured=simulation.measured,
             command=memory.command,
             heading_reference=(memory.heading_reference + memory.heading_offset)[:, None],

@@ -10,7 +10,7 @@ from iowbc.recipe.task.curriculum import Ceilings, Curriculum, Scale
 AXES = ("posture", "locomotion", "load", "disturbance")
 """Columns of the levels."""
 POSTURE, LOCOMOTION, LOAD, DISTURBANCE = range(len(AXES))
-OWN_RANGES = 1.0
+FULL_RANGE_LEVEL = 1.0
 """Level at which the recipe's ranges are used in full; above it commands and loads may be infeasible."""
 ROUNDING = 1e-9
 """Tolerance for comparing levels, which are sums of rises."""
@@ -108,7 +108,7 @@ def _success(curriculum: Curriculum, played: Array, outcome: EpisodeOutcome) -> 
     steady = outcome.survived & (outcome.posture >= curriculum.tracking)
     walked = outcome.walked >= curriculum.least_walk
     there = (outcome.covered >= curriculum.progress) & (outcome.heading <= curriculum.heading)
-    beyond = outcome.infeasible | (played[:, LOCOMOTION] > OWN_RANGES + ROUNDING)
+    beyond = outcome.infeasible | (played[:, LOCOMOTION] > FULL_RANGE_LEVEL + ROUNDING)
     success = np.repeat(steady[:, None], len(AXES), axis=1)
     carried = ~walked | outcome.infeasible | (outcome.covered >= curriculum.load_progress)
     success[:, LOAD] &= carried
@@ -123,7 +123,7 @@ def _failure(curriculum: Curriculum, played: Array, outcome: EpisodeOutcome) -> 
     statue = outcome.survived & (outcome.walked >= curriculum.least_walk) & (outcome.covered < curriculum.lagging)
     failure = np.zeros(played.shape, np.bool_)
     failure[:, DISTURBANCE] = ended & pushed
-    statue &= ~outcome.infeasible & (played[:, LOCOMOTION] <= OWN_RANGES)
+    statue &= ~outcome.infeasible & (played[:, LOCOMOTION] <= FULL_RANGE_LEVEL)
     failure[:, LOCOMOTION] = (ended & walking & ~pushed) | statue
     failure[:, POSTURE] = failure[:, LOAD] = ended & ~walking & ~pushed
     return failure

@@ -13,12 +13,12 @@ from iowbc.task.rewards.table import TRACKED
 COUNTERS = ("episode", "draws", "steps", "limit", "goal_until", "undisturbed", "walked")
 FLAGS = ("walking", "infeasible", "failed", "stepping")
 """Integer and boolean fields; all others but `failed_key` are float64."""
-OF_EPISODE = (
+PER_EPISODE_FIELDS = (
     *("action", "earlier_action", "filtered_velocity", "excess_force", "lag", "tracking"),
     *("walked", "commanded", "covered", "heading_error", "total"),
 )
 """Fields that are zero at the start of an episode."""
-LONG_AGO = 1_000_000
+NEVER_DISTURBED = 1_000_000
 """Control steps since a disturbance that has not happened yet."""
 
 
@@ -110,6 +110,6 @@ class EpisodeState:
 
     def clear(self, which: Indices) -> None:
         """Resets the fields of the last episode in some environments, (k,)."""
-        for name in OF_EPISODE:
+        for name in PER_EPISODE_FIELDS:
             getattr(self, name)[which] = 0
-        self.undisturbed[which] = LONG_AGO
+        self.undisturbed[which] = NEVER_DISTURBED

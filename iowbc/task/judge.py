@@ -11,12 +11,12 @@ from iowbc.control.command import PITCH, YAW_RATE
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.rotations import wrapped
 from iowbc.sim.state import SimulationState
-from iowbc.task.curriculum import LOCOMOTION, OWN_RANGES
+from iowbc.task.curriculum import FULL_RANGE_LEVEL, LOCOMOTION
 from iowbc.task.endings import Ending, dropped, fallen, lagging, lost
 from iowbc.task.episode_state import EpisodeState
 from iowbc.task.motion import Motion, low_pass, motion
 from iowbc.task.progress import follow
-from iowbc.task.rewards.reward import RewardFunction, Scored
+from iowbc.task.rewards.reward import RewardFunction, RewardResult
 from iowbc.task.rewards.table import Step
 from iowbc.task.yielding import Admittance, excess_force
 
@@ -27,7 +27,7 @@ class Judgement:
 
     motion: Motion
     ending: Ending
-    scored: Scored
+    scored: RewardResult
     command: Array
     """C during the step, (n, 11)."""
     heading_error: Array
@@ -126,7 +126,7 @@ class Judge:
         self, state: SimulationState, memory: EpisodeState, moved: Motion, place: Array, error: Array, pushed: Mask
     ) -> Ending:
         termination, diverged = self._task.termination, state.diverged.copy()
-        followable = ~pushed & (memory.played[:, LOCOMOTION] <= OWN_RANGES) & self._training
+        followable = ~pushed & (memory.played[:, LOCOMOTION] <= FULL_RANGE_LEVEL) & self._training
         left = lost(moved, place, pushed & self._training, termination)
         return Ending(
             fallen=fallen(moved, memory.command[:, PITCH], termination) & ~diverged,

@@ -11,7 +11,7 @@ import numpy as np
 
 from iowbc.arrays import Array, Mask
 from iowbc.errors import StageFailed, nearest
-from iowbc.recipe.beside import ModuleFile, OwnFunction
+from iowbc.recipe.beside import CustomFunction, ModuleFile
 
 Source = TypeVar("Source")
 """Type of a function's argument."""
@@ -55,7 +55,7 @@ class CheckedFunction(Generic[Source]):
         return found
 
 
-def load_function(path: str, own: OwnFunction, contract: str) -> CheckedFunction[Any]:
+def load_function(path: str, own: CustomFunction, contract: str) -> CheckedFunction[Any]:
     """Executes the file of a function. `path`: in the recipe; `contract`: see `CheckedFunction`.
 
     Raises StageFailed where it cannot be used.

@@ -7,7 +7,7 @@ from functools import cached_property
 from iowbc.arrays import Array
 from iowbc.control.layout import Part
 from iowbc.errors import StageFailed
-from iowbc.recipe.task.task import Observation, OwnPart
+from iowbc.recipe.task.task import CustomPart, Observation
 from iowbc.robot.mirror import in_place
 from iowbc.task.own_function import CheckedFunction, load_function
 from iowbc.task.privileged import PRIVILEGED, Truth
@@ -23,7 +23,7 @@ class OwnValue:
     """The values of a part."""
 
     path: str
-    said: OwnPart
+    said: CustomPart
 
     @cached_property
     def function(self) -> CheckedFunction[Truth]:
@@ -58,7 +58,7 @@ def taken_names(recipe: Observation) -> Iterator[tuple[str, str]]:
             yield _path(name), "s_priv has a part of this name already; take another"
 
 
-def _part(name: str, said: OwnPart) -> Part[Truth]:
+def _part(name: str, said: CustomPart) -> Part[Truth]:
     """Only the author knows unit and frame. The hash of the file and the mirror signs replace them, so that a change of
     either makes another observation."""
     unit = f"of {said.function} in {said.module.sha256[:12]}"

@@ -66,7 +66,7 @@ class Schedule:
         """Starts new episodes and returns their keys, (k,)."""
         memory = self._memory
         memory.episode[which] += 1
-        key = self._replayed(which, random.absorb(self.key[which], memory.episode[which]))
+        key = self._with_replays(which, random.absorb(self.key[which], memory.episode[which]))
         self.episode_key[which] = key
         memory.steps[which] = 0
         memory.limit[which] = self._time_limits(which, key)
@@ -75,7 +75,7 @@ class Schedule:
         memory.played[which] = played_levels(self._task.curriculum, memory.level[which], ~standing)
         return key
 
-    def _replayed(self, which: Indices, key: Keys) -> Keys:
+    def _with_replays(self, which: Indices, key: Keys) -> Keys:
         """Keys of new episodes (k,), some replaced by that of the environment's failed episode."""
         chance = self._task.curriculum.replay
         if chance == 0.0 or self._trials is not None:

@@ -132,7 +132,7 @@ def begun(world: Specification, robot: Robot, name: str, mass: float = np.nan) -
         control_frequency=recipe.task.control_frequency,
     )
     references = ReferenceLayer(robot, recipe.task.references, world.rg)
-    command = references.clamp(references.startable(nominal_command(recipe.task.commands)[None]))
+    command = references.clamp(references.start_command(nominal_command(recipe.task.commands)[None]))
     arms, posture = references.start(command, both_wrists(getattr(recipe.task.references.grasps, name))[None])
     joints = np.empty((1, len(robot.joints)))
     joints[:, robot.support], joints[:, robot.interaction] = posture, arms

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from iowbc.adapters.adapter import Adapter, require_fitting, scaled
+from iowbc.adapters.adapter import Adapter, scaled, validate_adapter
 from iowbc.adapters.source import robot_of
 from iowbc.errors import StageFailed
 from iowbc.robot.description import Robot, load_robot
@@ -30,7 +30,7 @@ def adapter(robot: Robot) -> Adapter:
 
 
 def test_a_fitting_adapter_passes(robot: Robot, adapter: Adapter) -> None:
-    require_fitting(adapter, robot, 50.0, "eval.public")
+    validate_adapter(adapter, robot, 50.0, "eval.public")
 
 
 @pytest.mark.parametrize(
@@ -49,15 +49,15 @@ def test_a_fitting_adapter_passes(robot: Robot, adapter: Adapter) -> None:
 )
 def test_what_does_not_fit_is_named(robot: Robot, adapter: Adapter, changes: dict[str, object], message: str) -> None:
     with pytest.raises(StageFailed, match=message):
-        require_fitting(replace(adapter, **changes), robot, 50.0, "eval.public")
+        validate_adapter(replace(adapter, **changes), robot, 50.0, "eval.public")
 
 
 def test_arms_of_its_own_need_all_arm_joints(robot: Robot, adapter: Adapter) -> None:
     text = "acted: lacks left_shoulder_pitch_joint, .*; a controller without arms of its own needs arms: measured or"
     with pytest.raises(StageFailed, match=text):
-        require_fitting(adapter, robot, 50.0, "eval.public", moves_arms=True)
+        validate_adapter(adapter, robot, 50.0, "eval.public", moves_arms=True)
     whole = replace(adapter, acted=robot.joints, scale=np.full(29, 0.25), network=lambda seen: seen[:, :29])
-    require_fitting(whole, robot, 50.0, "eval.public", moves_arms=True)
+    validate_adapter(whole, robot, 50.0, "eval.public", moves_arms=True)
 
 
 @pytest.mark.parametrize("moves_arms", [False, True])

@@ -8,7 +8,7 @@ from typing import Any, cast
 
 from made_up_trials import trials_of
 
-from iowbc.commands.compare import report_together
+from iowbc.commands.compare import report_joint
 from iowbc.commands.lookup import film_of, points_of, record_comparison
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
@@ -100,7 +100,7 @@ def test_trainings_that_differ_in_their_seeds_alone_are_one_variant(tmp_path: Pa
         evaluated(tmp_path, "again", "IO-WBC", 0.2, 7, 4096),
         evaluated(tmp_path, "longer", "IO-WBC", 0.4, None, 8192),
     ]
-    report_together(runs, tmp_path, ["never"])
+    report_joint(runs, tmp_path, ["never"])
     tables = tmp_path / "tables"
     lifting = (tables / "lifting.md").read_text()
     assert "| 0 kg | full | 0.350 ± " in lifting, "of ten trials; the label belongs to another recipe as well"

@@ -55,7 +55,7 @@ def test_a_load_adds_the_transposed_jacobian_of_its_weight(robot: Robot) -> None
 
 
 def test_what_moves_on_a_hinge_of_its_own_is_no_burden(robot: Robot) -> None:
-    mass, moment = robot.tree.burden(robot.wrist_bodies[0])
+    mass, moment = robot.tree.rigid_mass(robot.wrist_bodies[0])
     hand = robot.tree.bodies[robot.wrist_bodies[0]]
     assert mass == pytest.approx(hand.mass)
     assert moment == pytest.approx(hand.mass * hand.centre)

@@ -7,7 +7,7 @@ import pytest
 
 from iowbc.control import observation
 from iowbc.control.layout import Part
-from iowbc.control.observation import Sensed, observation_layout
+from iowbc.control.observation import PolicyInputs, observation_layout
 from iowbc.control.sensors import Measured, quantities
 from iowbc.robot.description import Robot
 from iowbc.robot.mirror import scalar
@@ -15,14 +15,14 @@ from iowbc.robot.mirror import scalar
 ROWS = 4
 
 
-def sensed(robot: Robot) -> Sensed:
+def sensed(robot: Robot) -> PolicyInputs:
     random = np.random.default_rng(0)
     arrays: dict[str, Any] = {
         name: random.normal(size=(ROWS, len(what.kind(robot))))
         for name, what in (quantities(of_object=False) | quantities(of_object=True)).items()
     }
     support = len(robot.support)
-    return Sensed(
+    return PolicyInputs(
         measured=Measured(**arrays),
         command=random.normal(size=(ROWS, 11)),
         heading_reference=random.normal(size=(ROWS, 1)),
@@ -73,7 +73,7 @@ def test_a_quaternion_and_its_opposite_are_one_orientation(robot: Robot) -> None
     np.testing.assert_array_equal(observation.object_orientation(seen), vector)
 
 
-def downhill(seen: Sensed) -> Any:
+def downhill(seen: PolicyInputs) -> Any:
     return seen.measured.projected_gravity[:, :1]
 
 

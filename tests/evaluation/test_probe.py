@@ -15,13 +15,13 @@ from iowbc.evaluation.probe import (
     LATENT,
     NEWEST,
     PRIVILEGED,
-    Listener,
     ProbeReadings,
+    RecordingPolicy,
     gathered,
     inferred_masses,
 )
 from iowbc.evaluation.report.probe import figures_of, probe_figure, probe_table, write_probe
-from iowbc.evaluation.report.statistics import determination, determination_interval
+from iowbc.evaluation.report.statistics import determination_interval, r_squared
 from iowbc.learning.acting import StudentPolicy, TeacherPolicy
 from iowbc.learning.networks import StudentNetwork, TeacherNetwork
 
@@ -88,7 +88,7 @@ def rows(size: int, seed: int = 0) -> NDArray[np.float32]:
 def test_a_listener_leaves_the_policy_as_it_is_and_reads_its_latent() -> None:
     torch.manual_seed(0)
     network = StudentNetwork(6, 4, 2, 3, 5, [8], "elu", 10.0)
-    listener, alone = Listener(StudentPolicy(network, 4), 3, 2, 25), StudentPolicy(network, 4)
+    listener, alone = RecordingPolicy(StudentPolicy(network, 4), 3, 2, 25), StudentPolicy(network, 4)
     for policy in (listener, alone):
         policy.reset(np.ones(3, np.bool_))
     for moment in range(5):
@@ -105,7 +105,7 @@ def test_a_listener_leaves_the_policy_as_it_is_and_reads_its_latent() -> None:
 
 
 def test_a_teacher_is_listened_to_without_a_latent() -> None:
-    listener = Listener(TeacherPolicy(TeacherNetwork(13, 2, [4], "elu", 10.0)), 3, 1, 25)
+    listener = RecordingPolicy(TeacherPolicy(TeacherNetwork(13, 2, [4], "elu", 10.0)), 3, 1, 25)
     listener.reset(np.ones(3, np.bool_))
     listener.act(rows(6), rows(7))
     assert list(listener.kept[0]) == [HISTORY, NEWEST, PRIVILEGED]
@@ -114,17 +114,17 @@ def test_a_teacher_is_listened_to_without_a_latent() -> None:
 
 def test_r_squared_is_that_of_the_textbooks() -> None:
     mass = np.array([1.0, 2.0, 3.0, 4.0])
-    assert determination(mass, mass) == 1.0
-    assert determination(mass, np.full(4, 2.5)) == 0.0
-    assert determination(mass, mass + np.array([1.0, -1.0, 1.0, -1.0])) == pytest.approx(1 - 4 / 5)
-    assert np.isnan(determination(np.ones(3), np.ones(3)))
+    assert r_squared(mass, mass) == 1.0
+    assert r_squared(mass, np.full(4, 2.5)) == 0.0
+    assert r_squared(mass, mass + np.array([1.0, -1.0, 1.0, -1.0])) == pytest.approx(1 - 4 / 5)
+    assert np.isnan(r_squared(np.ones(3), np.ones(3)))
 
 
 def test_repeating_the_readings_of_a_trial_makes_no_interval_narrower() -> None:
     mass = np.linspace(1.0, 10.0, 30)
     read, trial = mass + np.random.default_rng(0).normal(size=30), np.arange(30)
     low, high = determination_interval(mass, read, trial)
-    assert low < determination(mass, read) < high
+    assert low < r_squared(mass, read) < high
     assert determination_interval(np.tile(mass, 5), np.tile(read, 5), np.tile(trial, 5)) == pytest.approx((low, high))
 
 

@@ -12,7 +12,7 @@ from exported_policies import read_golden
 
 from iowbc.control import observation
 from iowbc.control.layout import Part
-from iowbc.control.observation import Sensed
+from iowbc.control.observation import PolicyInputs
 from iowbc.deploy.contract import Contract
 from iowbc.deploy.controller import open_session, run
 from iowbc.deploy.exported_folder import SETTLE, STEP
@@ -140,7 +140,7 @@ def test_opsets_differ_in_form_only(graph: ControllerGraph, tmp_path: Path) -> N
     assert max(largest_difference(run_torch(graph.step, inputs), outputs).values()) < TOLERANCE
 
 
-def knees(sensed: Sensed) -> Any:
+def knees(sensed: PolicyInputs) -> Any:
     return sensed.measured.joint_position[:, 3:4] * sensed.measured.joint_position[:, 9:10]
 
 

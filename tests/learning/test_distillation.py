@@ -1,6 +1,6 @@
 import numpy as np
 
-from iowbc.learning.distillation import Experience, mirror_half, spread
+from iowbc.learning.distillation import ReplayBuffer, mirror_half, spread
 from iowbc.robot.mirror import MirrorMap
 from iowbc.rollouts.history import History
 
@@ -9,7 +9,7 @@ def test_a_sampled_history_is_the_one_that_the_student_saw() -> None:
     random = np.random.default_rng(0)
     history, experience = (
         History(3, 4, 2),
-        Experience(capacity=3 * 10, environments=3, observation=2, targets=1, history=4),
+        ReplayBuffer(capacity=3 * 10, environments=3, observation=2, targets=1, history=4),
     )
     seen: dict[tuple[float, float], np.ndarray] = {}
     starts = np.ones(3, np.bool_)
@@ -28,11 +28,11 @@ def test_a_sampled_history_is_the_one_that_the_student_saw() -> None:
 
 def test_the_ring_restores_exactly() -> None:
     random = np.random.default_rng(1)
-    first = Experience(40, 2, 3, 1, 5)
+    first = ReplayBuffer(40, 2, 3, 1, 5)
     for step in range(30):
         starts = np.full(2, step % 7 == 0)
         first.add(random.normal(size=(2, 3)).astype(np.float32), random.normal(size=(2, 1)).astype(np.float32), starts)
-    second = Experience(40, 2, 3, 1, 5)
+    second = ReplayBuffer(40, 2, 3, 1, 5)
     second.restore(first.arrays())
     for a, b in zip(
         first.sample(50, np.random.default_rng(2)), second.sample(50, np.random.default_rng(2)), strict=True

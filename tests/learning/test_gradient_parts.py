@@ -6,7 +6,7 @@ import pytest
 import torch
 from point_masses import MIRRORS, PointMasses
 
-from iowbc.learning.computing import SideBySide, reduced
+from iowbc.learning.computing import ParallelBatch, reduced
 from iowbc.learning.teacher import TeacherTraining
 from iowbc.recipe.teacher import Teacher
 
@@ -14,14 +14,14 @@ from iowbc.recipe.teacher import Teacher
 @pytest.mark.parametrize("cores", [1, 2, 3])
 def test_parts_come_back_in_their_order(cores: int) -> None:
     batch = torch.arange(10.0)[:, None]
-    found = SideBySide(3, cores)(lambda part: part[:, 0].tolist(), batch)
+    found = ParallelBatch(3, cores)(lambda part: part[:, 0].tolist(), batch)
     assert [value for part in found for value in part] == list(range(10))
     assert len(found) == 3
 
 
 def test_two_cores_work_at_the_same_time() -> None:
     meeting = threading.Barrier(2, timeout=30.0)
-    SideBySide(2, 2)(lambda part: meeting.wait(), torch.zeros(2, 1))
+    ParallelBatch(2, 2)(lambda part: meeting.wait(), torch.zeros(2, 1))
 
 
 def test_what_is_learnt_does_not_depend_on_the_cores() -> None:
@@ -49,7 +49,7 @@ def test_threads_round_as_one_does_where_a_layer_is_used_twice() -> None:
         found = torch.autograd.grad((ahead + image).float().square().mean(), list(layers.parameters()))
         return torch.cat([each.flatten() for each in found])
 
-    alone, together = SideBySide(4, 1), SideBySide(4, 4)
+    alone, together = ParallelBatch(4, 1), ParallelBatch(4, 4)
     expected = torch.stack(alone(gradient, rows))
     for _ in range(50):
         torch.testing.assert_close(torch.stack(together(gradient, rows)), expected, rtol=0.0, atol=0.0)

@@ -15,7 +15,7 @@ import numpy as np
 from iowbc.deploy.controller import Controller
 from iowbc.deploy.exported_folder import exported_folder
 from iowbc.evaluation.exported import exported_world
-from iowbc.onboard.machine import Machine, State, TurnInputs, Wanted
+from iowbc.onboard.machine import CycleInputs, Machine, OperatorRequest, State
 from iowbc.onboard.messages import Record
 from iowbc.onboard.operators import Ranges
 from iowbc.onboard.process import PERIOD
@@ -184,9 +184,9 @@ def play(folder: Path, fault: Fault) -> Outcome:
         arrived = states([twin.state], since) if broken else [twin.state]
         request = next((requests.pop(when) for when in list(requests) if now >= when), None)
         at = at if broken and fault.silent else now
-        wanted = Wanted(standing, at, request)
+        wanted = OperatorRequest(standing, at, request)
         charge = fault.charge if broken else None
-        command = machine.turn(TurnInputs(now, tuple(arrived), wanted, fault.others * broken, charge))
+        command = machine.turn(CycleInputs(now, tuple(arrived), wanted, fault.others * broken, charge))
         if broken and machine.state is State.DAMPING and not reason:
             reason, time = machine.events[-1].partition(": ")[2], turn * PERIOD - ONSET
         for each in commands([command], since) if broken else [command]:

@@ -20,10 +20,10 @@ from iowbc.deploy.controller import Controller
 from iowbc.deploy.exported_folder import exported_folder
 from iowbc.onboard.dds import DdsBus
 from iowbc.onboard.log import LogWriter
-from iowbc.onboard.machine import Machine, State, Wanted
+from iowbc.onboard.machine import Machine, OperatorRequest, State
 from iowbc.onboard.messages import Record
 from iowbc.onboard.operators import Operator, OperatorWithPoses, Ranges, Udp
-from iowbc.onboard.process import Clock, LockStep, MonotonicClock, drive, listen, prefer_this_process
+from iowbc.onboard.process import Clock, LockStep, MonotonicClock, drive, enable_realtime, listen
 
 TASKS = {
     "stand": ("free", (), (0.0, 0.0, 0.0)),
@@ -67,7 +67,7 @@ class Sampled:
     sample: Callable[[float], None]
     last: float = -np.inf
 
-    def wanted(self, now: float, state: Record | None) -> Wanted:
+    def wanted(self, now: float, state: Record | None) -> OperatorRequest:
         if now >= self.last + INTERVAL:
             self.last = now
             self.sample(now)
@@ -163,7 +163,7 @@ def main() -> None:
         measure_memory(folder, given.seconds, given.domain)
         return
     if given.realtime:
-        print(prefer_this_process())  # as `iowbc robot`; the simulated robot inherits the priority
+        print(enable_realtime())  # as `iowbc robot`; the simulated robot inherits the priority
     passed = dict.fromkeys(given.task or TASKS, 0)
     for seed in range(given.trials):
         for task in passed:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from iowbc.arrays import Array
-from iowbc.onboard.machine import State, Wanted
+from iowbc.onboard.machine import OperatorRequest, State
 from iowbc.onboard.messages import Record
 
 STARTS = ((0.2, State.DAMPING), (1.5, State.STAND), (4.6, State.RUN))
@@ -30,7 +30,7 @@ class Script:
         self._asked = 0
         self.ended = False
 
-    def wanted(self, now: float, state: Record | None) -> Wanted:
+    def wanted(self, now: float, state: Record | None) -> OperatorRequest:
         self._begin = now if self._begin is None else self._begin
         passed = now - self._begin
         request = None
@@ -42,7 +42,7 @@ class Script:
             self._end()
         command = self._standing.copy()
         command[:3] = self._velocity * (passed >= SETTLED)
-        return Wanted(command, now, request)
+        return OperatorRequest(command, now, request)
 
 
 @contextmanager

@@ -8,7 +8,7 @@ from iowbc.arrays import Array
 from iowbc.control.sensors import Measured
 from iowbc.deploy.controller import Controller
 from iowbc.onboard.checks import SafetyLimits
-from iowbc.onboard.machine import Machine, State, TurnInputs, Wanted
+from iowbc.onboard.machine import CycleInputs, Machine, OperatorRequest, State
 from iowbc.onboard.messages import Record
 from iowbc.onboard.operators import Ranges
 from iowbc.onboard.process import PERIOD
@@ -53,8 +53,8 @@ class Still:
         self.turns += 1
         given = (self.state(),) if states is None else states
         now = self.now + other.get("late", 0.0)
-        wanted = Wanted(self.standing, other.get("at", now), request, self.seen, now)
-        return self.machine.turn(TurnInputs(now, given, wanted, int(other.get("others", 0)), other.get("charge")))
+        wanted = OperatorRequest(self.standing, other.get("at", now), request, self.seen, now)
+        return self.machine.turn(CycleInputs(now, given, wanted, int(other.get("others", 0)), other.get("charge")))
 
     def until(self, state: State) -> Record:
         """Goes through the states up to one of them; the last command."""

@@ -17,7 +17,7 @@ from still import Still
 from iowbc.control.sensors import Measured
 from iowbc.deploy.controller import Controller
 from iowbc.onboard import messages
-from iowbc.onboard.machine import State, Wanted
+from iowbc.onboard.machine import OperatorRequest, State
 from iowbc.onboard.messages import Record
 from iowbc.onboard.process import LockStep, drive
 from iowbc.onboard.sensors import Sensors
@@ -26,7 +26,7 @@ from iowbc.twin.robot import low_state
 pytest.importorskip("cyclonedds")
 pytest.importorskip("mcap")
 from iowbc.onboard.dds import DdsBus
-from iowbc.onboard.log import LogWriter, export_digest, read_turns, replay
+from iowbc.onboard.log import LogWriter, export_digest, read_cycles, replay
 
 pytestmark = pytest.mark.integration
 STEPS = 100
@@ -107,13 +107,13 @@ class Rollout:
         state["tick"], state["imu_state"]["temperature"] = 2 * self.turns, self.turns % 100
         return state
 
-    def wanted(self, now: float, state: Record | None) -> Wanted:
+    def wanted(self, now: float, state: Record | None) -> OperatorRequest:
         order = {State.ZERO_TORQUE: State.DAMPING, State.DAMPING: State.STAND, State.STAND: State.RUN}
         request = order.get(self.machine.state) if self.run == 0 and self.turns % 60 == 0 else None
         if self.machine.state is State.RUN:
             self.run += 1
         command = self.inputs["command"][self._step(self.run)].astype(np.float64)
-        return Wanted(command, now, request)
+        return OperatorRequest(command, now, request)
 
 
 def test_a_golden_rollout_over_the_bus_equals_the_one_without(
@@ -152,10 +152,10 @@ def test_a_golden_rollout_over_the_bus_equals_the_one_without(
     assert np.abs(np.array(expected) - rollout.outputs["target"][:STEPS]).max() < 0.1
 
     turns, different = replay(tmp_path / "log.mcap", blind)
-    assert (different, turns) == (0, len(list(read_turns(tmp_path / "log.mcap"))))
+    assert (different, turns) == (0, len(list(read_cycles(tmp_path / "log.mcap"))))
     whole = (tmp_path / "log.mcap").read_bytes()
     (tmp_path / "cut.mcap").write_bytes(whole[: len(whole) // 2])
-    assert 0 < len(list(read_turns(tmp_path / "cut.mcap"))) < turns
+    assert 0 < len(list(read_cycles(tmp_path / "cut.mcap"))) < turns
 
 
 def test_a_program_whose_robot_is_killed_damps_and_ends(blind: Path, domain: int) -> None:

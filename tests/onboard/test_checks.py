@@ -11,11 +11,11 @@ from still import Still
 from iowbc.commands.robot import report_checks
 from iowbc.errors import UsageError
 from iowbc.onboard import messages
-from iowbc.onboard.checks import LIMITS, CheckResult, Listened, checks
+from iowbc.onboard.checks import LIMITS, BusSnapshot, CheckResult, checks
 from iowbc.onboard.messages import Record
 
 
-def heard(still: Still, change: Callable[[Record], None] = lambda state: None) -> Listened:
+def heard(still: Still, change: Callable[[Record], None] = lambda state: None) -> BusSnapshot:
     states = []
     for _ in range(45):
         still.turns += 1
@@ -23,10 +23,10 @@ def heard(still: Still, change: Callable[[Record], None] = lambda state: None) -
         change(states[-1])
     battery = messages.empty(messages.BATTERY_STATE)
     battery["soc"] = 80
-    return Listened(states, 0.1, battery, 0, "")
+    return BusSnapshot(states, 0.1, battery, 0, "")
 
 
-def failed(still: Still, listened: Listened) -> list[str]:
+def failed(still: Still, listened: BusSnapshot) -> list[str]:
     return [check.name for check in checks(still.controller, listened, still.standing, LIMITS) if not check.passed]
 
 

@@ -14,7 +14,7 @@ from iowbc.evaluation.exported import exported_world
 from iowbc.live.remote_view import Asked
 from iowbc.onboard import messages
 from iowbc.onboard.checks import SafetyLimits
-from iowbc.onboard.machine import Machine, State, TurnInputs, Wanted
+from iowbc.onboard.machine import CycleInputs, Machine, OperatorRequest, State
 from iowbc.onboard.messages import Record
 from iowbc.onboard.operators import Ranges, object_poses
 from iowbc.onboard.process import PERIOD
@@ -113,8 +113,8 @@ def test_a_policy_that_observes_the_object_carries_it_by_the_pose_that_the_robot
     for turn in range(1500):
         now = turn * PERIOD
         pose = poses.wanted(now, None)
-        wanted = Wanted(standing, now, requests.get(turn), pose.seen, pose.seen_at)
-        twin.command(machine.turn(TurnInputs(now, (twin.state,), wanted)))
+        wanted = OperatorRequest(standing, now, requests.get(turn), pose.seen, pose.seen_at)
+        twin.command(machine.turn(CycleInputs(now, (twin.state,), wanted)))
         twin.step()
         tracking.send(twin)
     tracking.close()

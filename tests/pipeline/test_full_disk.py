@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from workplace import COMMAND, RECIPE, SLOW, Workplace, until
 
-from iowbc.full_disk import nothing_fits, what_is_full
+from iowbc.full_disk import is_disk_full, what_is_full
 
 
 def assert_told(errors: str, command: str = "iowbc run small.yaml") -> None:
@@ -66,8 +66,8 @@ def test_errors_that_say_that_nothing_fits_are_known_however_they_are_wrapped(tm
     wrapped.__cause__ = plain
     library = RuntimeError("[enforce fail at inline_container.cc:783] . PytorchStreamWriter failed writing file data/3")
     for error in (plain, wrapped, library, OSError(errno.EFBIG, "File too large"), OSError(errno.EDQUOT, "")):
-        assert nothing_fits(error)
-    assert not nothing_fits(OSError(errno.EACCES, "Permission denied"))
+        assert is_disk_full(error)
+    assert not is_disk_full(OSError(errno.EACCES, "Permission denied"))
     assert what_is_full(wrapped, ()) == f"{tmp_path / 'file'} cannot be written: No space left on device"
 
 

@@ -8,19 +8,19 @@ import pytest
 from iowbc.recipe.skill.skill import Skill
 from iowbc.skill.figures import internal_force
 from iowbc.skill.reward import GameEnding, ending, potential, reward
-from iowbc.skill.situation import Situation
+from iowbc.skill.situation import GameState
 
 N = 5
 SKILL = Skill()
 
 
-def at(**values: object) -> Situation:
+def at(**values: object) -> GameState:
     """Games whose object is at rest on its path, but for some values."""
-    nothing = {name: np.zeros(N) for name in Situation.__dataclass_fields__}
-    return replace(Situation(**nothing), **{name: np.broadcast_to(value, N) for name, value in values.items()})
+    nothing = {name: np.zeros(N) for name in GameState.__dataclass_fields__}
+    return replace(GameState(**nothing), **{name: np.broadcast_to(value, N) for name, value in values.items()})
 
 
-def judged(now: Situation, **happened: object) -> GameEnding:
+def judged(now: GameState, **happened: object) -> GameEnding:
     flags = {name: np.broadcast_to(happened.get(name, False), N) for name in ("fallen", "dropped", "diverged")}
     return ending(
         SKILL,

@@ -100,8 +100,8 @@ def test_an_episode_starts_in_the_commanded_posture_only_with_a_generator(
     layer: ReferenceLayer, robot: Robot, generator: Path
 ) -> None:
     asked = command(height=0.65, pitch=0.4)
-    assert np.array_equal(ReferenceLayer(robot, References(), generator).startable(asked), asked)
-    start = layer.startable(asked)[0]
+    assert np.array_equal(ReferenceLayer(robot, References(), generator).start_command(asked), asked)
+    start = layer.start_command(asked)[0]
     assert (start[HEIGHT], start[PITCH]) == (robot.default_height, 0.0)
 
 

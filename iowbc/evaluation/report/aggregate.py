@@ -111,7 +111,7 @@ def variants_of(trials: pd.DataFrame) -> list[str]:
     )
 
 
-def asks_for_steps(rows: pd.DataFrame) -> bool:
+def stepping_commanded(rows: pd.DataFrame) -> bool:
     """True if stepping is commanded in any of these trials, as in the paper's. Errors of standing are not comparable
     to the paper's errors of walking."""
     return bool(rows["still_E_v_moving"].notna().any())

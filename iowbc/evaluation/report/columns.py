@@ -90,7 +90,7 @@ def mean_entry(head: str, name: str, form: str, scale: float = 1.0) -> Entry:
     return Entry(Column(head), lambda row: measured(scale * row.get(name, np.nan), form=form))
 
 
-def asks_for_transport(rows: pd.DataFrame) -> bool:
+def transport_commanded(rows: pd.DataFrame) -> bool:
     """True if any of these trials commands a distance that must be covered."""
     return bool((rows["commanded_distance"] >= SHORTEST_WAY).any()) and not (rows["kind"] == "stagnation").all()
 
@@ -109,11 +109,11 @@ SURVIVED = Entry(Column("Survived"), lambda row: f"{row['survived']}/{row['trial
 SUCCESS = Entry(
     Column("Success"),
     lambda row: f"{row['succeeded']}/{row['trials']}",
-    lambda rows: "none" if asks_for_transport(rows) else ABSENT,
+    lambda rows: "none" if transport_commanded(rows) else ABSENT,
 )
 OUTCOME = (
     SURVIVED,
     SUCCESS,
-    Entry(Column("Transport"), _transport, lambda rows: "0.00" if asks_for_transport(rows) else ABSENT),
+    Entry(Column("Transport"), _transport, lambda rows: "0.00" if transport_commanded(rows) else ABSENT),
     Entry(Column("Kept"), _kept),
 )

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from iowbc.evaluation.paper import TABLES, VARIANTS, reported
-from iowbc.evaluation.report.aggregate import asks_for_steps, suites_of
+from iowbc.evaluation.report.aggregate import stepping_commanded, suites_of
 from iowbc.evaluation.report.captions import conditions, in_common, measures, regime
 from iowbc.evaluation.report.columns import (
     ERROR_HEADS,
@@ -45,7 +45,7 @@ def error_table(
     chosen = summary[summary["suite"] == suite]
     kind = str(chosen["kind"].iloc[0])
     known = any(labels.get(str(variant), str(variant)) in VARIANTS for variant in chosen["variant"])
-    beside = kind in NUMBERS and known and asks_for_steps(chosen)
+    beside = kind in NUMBERS and known and stepping_commanded(chosen)
     entries = [*map(error_entry, ERROR_HEADS), *OUTCOME]
     entries += [_paper_entry(summary, error, labels) for error in ERRORS] if beside else []
     rows = with_paper(chosen, labels) if beside else chosen
@@ -77,7 +77,7 @@ def paper_table(summary: pd.DataFrame, labels: Mapping[str, str] = NO_LABELS) ->
     numbers: list[dict[str, object]] = []
     for suite in suites_of(summary, *NUMBERS):
         chosen = with_paper(summary[summary["suite"] == suite], labels)
-        if not asks_for_steps(chosen):
+        if not stepping_commanded(chosen):
             continue
         kind, name = chosen["kind"].iloc[0], f"{NUMBERS[chosen['kind'].iloc[0]]}, {suite}"
         known = chosen[chosen["variant"].map(lambda variant: labels.get(variant, variant)).isin(VARIANTS)]
@@ -168,7 +168,7 @@ def _ratio_entry(summary: pd.DataFrame, error: str) -> Entry:
 def _caption(chosen: pd.DataFrame, kind: str, with_paper: bool) -> str:
     shares = set(chosen["partner_share"])
     whom = f"{kind} alone" if shares == {0.0} else f"cooperative {kind}" if min(shares) > 0 else kind
-    like = f" (paper's Table {NUMBERS[kind]})" if kind in NUMBERS and asks_for_steps(chosen) else ""
+    like = f" (paper's Table {NUMBERS[kind]})" if kind in NUMBERS and stepping_commanded(chosen) else ""
     title = f"{whom}{like}" if kind in SWEPT else f"the suite {kind}"
     failed = f" {FAILS}: no trial survived." if (chosen["survived"] == 0).any() else ""
     aim = " Success here is survival in posture on feet that stay, with a push that goes on: the crate cannot move."

@@ -15,7 +15,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from iowbc.arrays import Array
 from iowbc.evaluation.paper import TABLES, VARIANTS
-from iowbc.evaluation.report.aggregate import asks_for_steps, suites_of, variants_of
+from iowbc.evaluation.report.aggregate import stepping_commanded, suites_of, variants_of
 from iowbc.evaluation.report.capacity import Capacities, load_capacities, push_capacities
 from iowbc.evaluation.report.captions import conditions
 from iowbc.evaluation.report.columns import STANDS_STILL
@@ -35,10 +35,10 @@ STILL_NOTE = "grey: a robot that stands still"
 PAPER_NOTE = "hollow, dotted: the paper's numbers, for its own commands; the friction of its crates is unknown"
 PANEL_WIDTH, SMALLEST_WIDTH = 3.75, 7.5
 """Width of a panel of the comparison, and minimum width of the whole figure [inch]."""
-ROOMY = 4
+VARIANTS_PER_PANEL = 4
 """Number of variants whose bars fit into a panel of `PANEL_WIDTH`; with more, it is wider."""
 LONGEST_TEXT = 5
-"""With more than `ROOMY` variants, texts above bars with more characters than this are rotated."""
+"""With more than `VARIANTS_PER_PANEL` variants, texts above bars with more characters than this are rotated."""
 LABEL_WIDTH = 11
 """Characters in a line under a bar."""
 SHIFT = 0.012
@@ -75,7 +75,7 @@ def comparison(summary: pd.DataFrame, capacity_rate: float) -> Figure:
     One panel for each of these that was evaluated.
     """
     sweeps = [suites_of(summary, kind)[0] for kind in NUMBERS if suites_of(summary, kind)]
-    bars = max(1.0, len(variants_of(summary)) / ROOMY)
+    bars = max(1.0, len(variants_of(summary)) / VARIANTS_PER_PANEL)
     widths = [*(1.0 for _ in sweeps), *[bars] * bool(sweeps), bars]
     figure, panels = _row(PANEL_WIDTH, widths, ConstrainedLayoutEngine(wspace=0.06))
     for axes, suite in zip(panels, sweeps, strict=False):
@@ -89,7 +89,7 @@ def comparison(summary: pd.DataFrame, capacity_rate: float) -> Figure:
         _capacity_bars(panels[-2], load_capacities(summary, capacity_rate), sweeps)
         panels[-2].set(title=f"load capacity at {100 * capacity_rate:.0f} % success", ylabel="mass [kg]")
     _success_panel(panels[-1], _heaviest(summary), "success rate")
-    walked = any(asks_for_steps(summary[summary["suite"] == suite]) for suite in sweeps)
+    walked = any(stepping_commanded(summary[summary["suite"] == suite]) for suite in sweeps)
     return finish(figure, panels, _note(walked) if sweeps else "", panels[0])
 
 
@@ -99,7 +99,7 @@ def robustness(summary: pd.DataFrame, rate: float) -> Figure:
     pushes = summary[summary["kind"] == "pushes"]
     shown = [*suites, *suites_of(summary, "pushes")]
     widths = [float(max(2, summary.loc[summary["suite"] == suite, "case"].nunique())) for suite in shown]
-    figure, panels = _row(1.2 * max(1.0, len(variants_of(summary)) / ROOMY), widths, "constrained")
+    figure, panels = _row(1.2 * max(1.0, len(variants_of(summary)) / VARIANTS_PER_PANEL), widths, "constrained")
     for axes, suite in zip(panels, suites, strict=False):
         _success_panel(axes, summary[summary["suite"] == suite], f"success, {suite}")
     if len(pushes):
@@ -121,7 +121,9 @@ def draw_bars(
     intervals: extent below and above the top of each bar, (2, labels), for variants with intervals.
     """
     width = 0.8 / max(len(heights), 3)
-    upright = len(heights) > ROOMY and max(len(text) for row in texts.values() for text in row) > LONGEST_TEXT
+    upright = (
+        len(heights) > VARIANTS_PER_PANEL and max(len(text) for row in texts.values() for text in row) > LONGEST_TEXT
+    )
     for place, (variant, values) in enumerate(heights.items()):
         positions = np.arange(len(labels)) + (place - (len(heights) - 1) / 2) * width
         colour = style_of(variant, list(heights))["color"]
@@ -165,7 +167,7 @@ def _row(panel: float, widths: Sequence[float], layout: Any) -> tuple[Figure, li
 
 
 def _with_paper(rows: pd.DataFrame) -> bool:
-    return rows["kind"].iloc[0] in NUMBERS and asks_for_steps(rows)
+    return rows["kind"].iloc[0] in NUMBERS and stepping_commanded(rows)
 
 
 def _note(with_paper: bool) -> str:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from iowbc.evaluation.report.aggregate import TRAINING, variants_of, with_trainings
 from iowbc.evaluation.report.captions import in_common
-from iowbc.evaluation.report.columns import HEADS, STANDS_STILL, asks_for_transport
+from iowbc.evaluation.report.columns import HEADS, STANDS_STILL, transport_commanded
 from iowbc.evaluation.report.error_tables import SWEPT
 from iowbc.evaluation.report.statistics import RESAMPLES, Bootstrapped, bootstrapped, interquartile_mean
 from iowbc.evaluation.trials.errors import ERRORS, error_norm
@@ -50,7 +50,7 @@ def interquartile_table(trials: pd.DataFrame) -> Table | None:
                     numbers[-1] |= one.named(key)
         if found:
             still = {name: float(interquartile_mean(within[f"still_{name}"].to_numpy(np.float64))) for name in ERRORS}
-            achieved = "none" if asks_for_transport(within) else ABSENT
+            achieved = "none" if transport_commanded(within) else ABSENT
             cells = [f"{value:.3f}" for value in still.values()]
             rows.append((str(suite), STANDS_STILL, ABSENT, ABSENT, achieved, *cells, ABSENT))
             numbers.append({"suite": suite, "variant": STANDS_STILL, **still})

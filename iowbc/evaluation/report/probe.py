@@ -11,7 +11,7 @@ from iowbc.evaluation.probe import PRIVILEGED
 from iowbc.evaluation.report.aggregate import variants_of
 from iowbc.evaluation.report.captions import partner
 from iowbc.evaluation.report.figures import finish, style_of
-from iowbc.evaluation.report.statistics import determination, determination_interval, root_mean_square
+from iowbc.evaluation.report.statistics import determination_interval, r_squared, root_mean_square
 from iowbc.results.picture import write_figure
 from iowbc.results.table import Column, Table, heads, measured, write_table
 
@@ -78,12 +78,12 @@ def figures_of(found: pd.DataFrame) -> dict[str, float]:
         "size": float(found["size"].iloc[0]),
         "trials": float(len(trials)),
         "readings": float(len(found)),
-        "R2": determination(mass, read),
+        "R2": r_squared(mass, read),
         "R2_low": low,
         "R2_high": high,
         "RMSE": root_mean_square(mass, read),
-        "R2_second": determination(*seconds.to_numpy().T),
-        "R2_trial": determination(*trials.to_numpy().T),
+        "R2_second": r_squared(*seconds.to_numpy().T),
+        "R2_trial": r_squared(*trials.to_numpy().T),
         "RMSE_trial": root_mean_square(*trials.to_numpy().T),
     }
 
@@ -126,7 +126,7 @@ def _growth(axes: Axes, inferred: pd.DataFrame) -> None:
         for source, line in zip(sources, lines, strict=False):
             found = inferred[(inferred["source"] == source) & (inferred["variant"] == variant)]
             values = {
-                seconds: determination(at["mass"].to_numpy(), at["inferred"].to_numpy())
+                seconds: r_squared(at["mass"].to_numpy(), at["inferred"].to_numpy())
                 for seconds, at in found.groupby("seconds")
                 if len(at) >= LEAST_TRIALS
             }

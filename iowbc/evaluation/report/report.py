@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from iowbc.evaluation.report.aggregate import TRAINING, aggregate, asks_for_steps, suites_of, with_trainings
+from iowbc.evaluation.report.aggregate import TRAINING, aggregate, stepping_commanded, suites_of, with_trainings
 from iowbc.evaluation.report.capacity import capacity_table, push_table
 from iowbc.evaluation.report.compliance import compliance_figure, compliance_table, impedance_table
 from iowbc.evaluation.report.differences import difference_table
@@ -51,7 +51,7 @@ def report_tables(
 ) -> list[Table]:
     """All tables that apply to the trials: walking only if it was commanded, joints only if a trial survived."""
     swept, kinds = suites_of(summary, *SWEPT), set(summary["kind"])
-    walked = [suite for suite in swept if asks_for_steps(summary[summary["suite"] == suite])]
+    walked = [suite for suite in swept if stepping_commanded(summary[summary["suite"] == suite])]
     several = len(with_trainings(trials)[["variant", TRAINING]].drop_duplicates()) > 1
     survived = not heaviest(summary).empty
     tables = [

@@ -87,7 +87,7 @@ def design_effect(successes: NDArray[np.bool_], worlds: NDArray[np.int64]) -> fl
     return float(np.clip(ratio**2, 1.0, most))
 
 
-def determination(true: NDArray[np.float64], inferred: NDArray[np.float64]) -> float:
+def r_squared(true: NDArray[np.float64], inferred: NDArray[np.float64]) -> float:
     """R², the fraction of variance explained; 0 for a prediction of the mean, NaN if the true values do not vary."""
     spread = np.sum(np.square(true - true.mean()))
     return float(1.0 - np.sum(np.square(true - inferred)) / spread) if spread > 0 else math.nan

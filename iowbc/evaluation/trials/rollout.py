@@ -15,7 +15,7 @@ from iowbc.task.vector.vector_env import VectorEnv
 
 RECORDED = tuple(field.name for field in fields(Trace) if field.name != "dt")
 """Names of the signals in a trace."""
-ASK_EVERY = 25
+INTERRUPT_CHECK_INTERVAL = 25
 """Control steps between checks for an interrupt."""
 
 
@@ -61,7 +61,7 @@ def play_in(
     finished = np.zeros(count, np.bool_)
     look(0.0)
     while not length.all():
-        if len(frames) % ASK_EVERY == 0:
+        if len(frames) % INTERRUPT_CHECK_INTERVAL == 0:
             if interrupted():
                 raise Interrupted(f"stopped after {len(frames) * dt:.1f} s of {count} episodes")
             progress(len(frames) * dt)

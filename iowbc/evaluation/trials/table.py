@@ -61,7 +61,7 @@ def survived(success: Success, outcome: Outcome) -> bool:
 
 
 def succeeded(success: Success, kind: str, metrics: dict[str, float], *, blocked: bool = False) -> bool:
-    """True if a survived trial is a success, see `carried_along`; in compliance trials also with bounded handle force.
+    """True if a survived trial is a success, see `transported`; in compliance trials also with bounded handle force.
 
     Infeasible pushes are judged by posture and pushing instead: in stagnation by the time of pushing with bounded foot
     slip, before a blocked crate (`blocked`) by a minimum push force with bounded hand force.
@@ -75,11 +75,11 @@ def succeeded(success: Success, kind: str, metrics: dict[str, float], *, blocked
         return posture and pushes and metrics["hand_force_p95"] <= success.hand_force
     if kind == COMPLIANCE:
         bounded = not metrics["handle_force_p95"] > success.handle_force
-        return bounded and carried_along(success, metrics, success.compliance_transport)
-    return carried_along(success, metrics)
+        return bounded and transported(success, metrics, success.compliance_transport)
+    return transported(success, metrics)
 
 
-def carried_along(asked: Success | Acceptance, metrics: dict[str, float], transport: float | None = None) -> bool:
+def transported(asked: Success | Acceptance, metrics: dict[str, float], transport: float | None = None) -> bool:
     """True if robot and object cover enough of the path, with enough weight in the hands, and stay together.
 
     transport: sufficient fraction of the path, default that of `asked`.

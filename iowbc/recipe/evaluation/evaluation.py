@@ -9,7 +9,7 @@ from iowbc.recipe.evaluation.model_based import ModelBased
 from iowbc.recipe.evaluation.public_controller import PublicController
 from iowbc.recipe.evaluation.sequences import DrawnScripts, Segment
 from iowbc.recipe.evaluation.suites import Compliance, HeavyCase, MassSweep, Probe, PushMap, Robustness, Stagnation
-from iowbc.recipe.section import COSMETIC, LATER, OwnName, Section
+from iowbc.recipe.section import COSMETIC, LATER, CustomName, Section
 from iowbc.recipe.simulation.scene import Object, Scene
 from iowbc.recipe.simulation.simulation import SimulationSettings
 
@@ -155,7 +155,7 @@ class Evaluation(Section):
     simulation: SimulationSettings | None = None
     """Simulation settings of all trials; empty: those of training. Set it (`{}` for the default) to evaluate variants
     that were trained under different settings in the same trials."""
-    scenes: dict[OwnName, TrialScene] = Field(default=SIZES)
+    scenes: dict[CustomName, TrialScene] = Field(default=SIZES)
     """Additional scenes by name: other objects, sizes and grasps for an already trained policy."""
     batch: int = Field(default=64, ge=1, le=10_000)
     """Trials simulated at once, over all workers. The policy always computes whole batches of this size, so that a

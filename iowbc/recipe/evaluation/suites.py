@@ -14,7 +14,7 @@ from iowbc.recipe.simulation.partner import BEHAVIOURS
 PartnerShare = Annotated[float, Field(ge=-1, le=1)] | None
 
 
-class Beyond(Section):
+class SweepExtension(Section):
     """Continuation of a sweep past its last mass, until no trial survives."""
 
     step: float = Field(default=2.0, gt=0)
@@ -23,7 +23,7 @@ class Beyond(Section):
     """Largest mass [kg]."""
 
 
-class WithShare(Section):
+class ShareOverride(Section):
     """Overrides of a sweep's settings for one partner share."""
 
     partner_share: float = Field(ge=-1, le=1)
@@ -45,14 +45,14 @@ class MassSweep(Section):
     """Also run the commands once without object and partner: the row "no object"."""
     undisturbed: Masses = ()
     """Masses of an additional suite without impulses and pushes if `eval.disturbances` is on [kg]; empty: none."""
-    beyond: Beyond | None = None
+    beyond: SweepExtension | None = None
     """Heavier masses, for as long as one trial survives; empty: stop at the last mass."""
     rolling_resistance: float | None = Field(default=None, ge=0, le=1)
     """Rolling resistance μ of the crate's wheels; empty: drawn as in training."""
     partner_shares: tuple[PartnerShare, ...] = Field(default=(0.0, 0.5), min_length=1)
     """Fractions of the weight (in pushing, of the rolling resistance) that the partner bears; the sweep runs once for
     each. Negative: the partner resists; 0: the robot bears all; empty: drawn as in training."""
-    with_share: tuple[WithShare, ...] = ()
+    with_share: tuple[ShareOverride, ...] = ()
     """Other masses, or another rolling resistance, for some of these shares."""
     fixed: Held = Field(default_factory=dict)
     """Fixed values of other randomized quantities, by name."""

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from iowbc.errors import Problem, RecipeError, nearest, shown
 from iowbc.files import read_limited
-from iowbc.recipe.beside import FileBeside
+from iowbc.recipe.beside import EmbeddedFile
 from iowbc.recipe.reading.document import MAXIMUM_DEPTH, Located, leaves, located, merged, read_document, read_value
 from iowbc.recipe.reading.validation import defaults, models_at, validate
 from iowbc.recipe.recipe import Recipe
@@ -105,7 +105,7 @@ def with_files(tree: Located, folder: Path) -> Located:
     def taken_in(leaf: Located, path: tuple[str, ...] = ()) -> Located:
         if isinstance(leaf.value, dict):
             return Located({name: taken_in(entry, (*path, name)) for name, entry in leaf.value.items()}, leaf.place)
-        kinds = [model for model in models_at(path) if issubclass(model, FileBeside)]
+        kinds = [model for model in models_at(path) if issubclass(model, EmbeddedFile)]
         if not kinds or not isinstance(leaf.value, str):
             return leaf
         below = folder if leaf.place.startswith("--set ") else Path(leaf.place.rsplit(":", 2)[0]).parent

@@ -12,7 +12,7 @@ from pydantic_core import ErrorDetails
 from iowbc.errors import PROBLEMS_TOLD, Problem, RecipeError, nearest, shown
 from iowbc.recipe.reading.document import Located, leaves, located, merged, plain
 from iowbc.recipe.recipe import Recipe
-from iowbc.recipe.section import NamedEntries, Unfitting
+from iowbc.recipe.section import InconsistentValues, NamedEntries
 
 LARGEST_NUMBER = 1e12
 """Upper bound on every number in a recipe."""
@@ -98,7 +98,7 @@ def _position(place: str) -> tuple[str, int, int]:
 def _each_problem(tree: Located, error: ErrorDetails) -> Iterator[tuple[str, str, str]]:
     """Place, `key 'x' = value`, and what is valid, for each problem of an error."""
     reason = error.get("ctx", {}).get("error")
-    if isinstance(reason, Unfitting):
+    if isinstance(reason, InconsistentValues):
         for dotted, text in reason.problems:
             below = [int(part) if part.isdecimal() else part for part in dotted.split(".")]
             path, found = descend(tree, [*error["loc"], *below])

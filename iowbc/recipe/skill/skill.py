@@ -191,7 +191,7 @@ class HumanAgent(Section):
     """Time constant with which a human player's spring follows the mouse [s]; browsers send events every 0.05 s."""
 
 
-class Pursuit(Section):
+class PathFollowing(Section):
     """Path following of scripted agents that know the path."""
 
     speed: float = Field(default=0.3, gt=0.0)
@@ -257,7 +257,7 @@ class Skill(Section):
     """The robot's nominal command and action."""
     human: HumanAgent = HumanAgent()
     """The human's action."""
-    pursuit: Pursuit = Pursuit()
+    pursuit: PathFollowing = PathFollowing()
     """Motion of scripted agents along the path."""
     finish: Finish = Finish()
     """Conditions that end a game."""

@@ -5,8 +5,8 @@ from typing import Literal
 
 from pydantic import Field
 
-from iowbc.recipe.beside import OwnFunction
-from iowbc.recipe.section import LATER, OwnName, Section
+from iowbc.recipe.beside import CustomFunction
+from iowbc.recipe.section import LATER, CustomName, Section
 
 
 class Kernel(Section):
@@ -141,7 +141,7 @@ class Yielding(Section):
     """Force at which `force` saturates [N], so that impacts cost no more."""
 
 
-class OwnTerm(OwnFunction):
+class CustomTerm(CustomFunction):
     """Custom reward term: a function in a user's file. It takes a `Step` (iowbc/task/rewards/table.py) of n
     environments and returns a value for each, (n,)."""
 
@@ -192,7 +192,7 @@ class Reward(Section):
     """Reward of an end in a fall or a drop, given once and not scaled by the control period."""
     later: Later | None = Field(default=None, json_schema_extra=LATER)
     """Weights for robots that walk; empty: constant weights."""
-    own: dict[OwnName, OwnTerm] = Field(default_factory=dict, json_schema_extra=LATER)
+    own: dict[CustomName, CustomTerm] = Field(default_factory=dict, json_schema_extra=LATER)
     """Custom terms by name, which is also that of their training curve; only training executes them."""
 
     def problems(self) -> Iterator[tuple[str, str]]:
@@ -207,6 +207,6 @@ class Reward(Section):
             yield "", f"later.weights: no term {unknown!r}; valid: {', '.join(sorted(terms))}"
 
     @property
-    def own_terms(self) -> dict[str, OwnTerm]:
+    def own_terms(self) -> dict[str, CustomTerm]:
         """Custom terms whose weight is not zero."""
         return {name: term for name, term in self.own.items() if not term.idle}

@@ -5,8 +5,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field
 
-from iowbc.recipe.beside import OwnFunction
-from iowbc.recipe.section import LATER, NamedEntries, OwnName, Section
+from iowbc.recipe.beside import CustomFunction
+from iowbc.recipe.section import LATER, CustomName, NamedEntries, Section
 from iowbc.recipe.task.commands import Commands
 from iowbc.recipe.task.curriculum import Curriculum
 from iowbc.recipe.task.joint_references import References
@@ -22,7 +22,7 @@ class Action(Section):
     """Actions are clipped to plus and minus this, in units of action."""
 
 
-class OwnPart(OwnFunction):
+class CustomPart(CustomFunction):
     """Custom part of s_priv: a function in a user's file. It takes the `Truth` (iowbc/task/privileged.py) of n
     environments and returns k values for each, (n, k)."""
 
@@ -37,7 +37,7 @@ class Observation(Section):
     observe_object: bool = True
     """Include the object's pose and rates in the base frame in s_t (eq. 5); otherwise teacher and student have
     proprioception only. `distill.observe_object` sets it for the student."""
-    own: dict[OwnName, OwnPart] = Field(default_factory=dict, json_schema_extra=LATER)
+    own: dict[CustomName, CustomPart] = Field(default_factory=dict, json_schema_extra=LATER)
     """Custom parts of s_priv by name; they are executed only to train or run a policy that observes s_priv."""
 
 

@@ -54,7 +54,7 @@ class Verdict:
     """Descriptions of the worst held-out samples."""
 
 
-def judge_fit(
+def check_fit(
     gates: FitGates, dataset: Dataset, held: Indices, predicted: Array, errors: TaskErrors, jumps: Array
 ) -> Verdict:
     """Compares predictions (n, 15) for the dataset's rows `held` with labels and commands; `jumps` (lines,) [rad]."""

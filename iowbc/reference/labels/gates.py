@@ -19,7 +19,7 @@ from iowbc.robot.mjcf import Capsule
 
 
 @dataclass(frozen=True)
-class Evidence:
+class LabelMeasurements:
     """Findings of the gates about a label."""
 
     torque: Array
@@ -30,7 +30,7 @@ class Evidence:
     """Height reached [m]."""
 
 
-class LabelJudge:
+class LabelChecker:
     """Holds the limits and buffers; one judge serves many labels."""
 
     def __init__(self, support: SupportModel, gates: LabelGates, height: Literal["pelvis", "com"]) -> None:
@@ -51,7 +51,7 @@ class LabelJudge:
         if self.collision.clearance(support.full_data)[0] < self.gates.collision_clearance:
             raise Rejected("arms collide")
 
-    def label(self, sample: Sample, posture: Posture) -> Evidence:
+    def label(self, sample: Sample, posture: Posture) -> LabelMeasurements:
         """Passes a label or raises `Rejected`. The support model must be locked to the sample."""
         support, gates, robot = self.support, self.gates, self.support.robot
         model, data = support.full, support.full_data
@@ -83,7 +83,7 @@ class LabelJudge:
         for reason, found in failed.items():
             if found:
                 raise Rejected(reason)
-        return Evidence(torque[6 + robot.support], margin, height)
+        return LabelMeasurements(torque[6 + robot.support], margin, height)
 
 
 class SelfCollision:

@@ -8,7 +8,7 @@ import numpy as np
 
 from iowbc.arrays import Array, Indices
 from iowbc.recipe.generator import ReferenceGenerator
-from iowbc.reference.labels.gates import LabelJudge
+from iowbc.reference.labels.gates import LabelChecker
 from iowbc.reference.labels.plan import SamplePlan
 from iowbc.reference.labels.sample import Sample
 from iowbc.reference.labels.static import StaticMethod
@@ -47,7 +47,7 @@ class Labeller:
         robot, recipe = load_robot(task.robot), task.recipe
         self.draw = SamplePlan(robot, recipe, task.seed).draw
         support = SupportModel(robot, recipe.problem)
-        self.judge = LabelJudge(support, recipe.gates, recipe.height)
+        self.judge = LabelChecker(support, recipe.gates, recipe.height)
         if task.method == "ocp":  # crocoddyl is loaded only where it is used
             from iowbc.reference.labels.optimal_control import OptimalControlMethod
 

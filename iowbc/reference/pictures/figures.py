@@ -16,7 +16,7 @@ from iowbc.reference.fit.task_error import TaskErrors
 from iowbc.reference.labels.checks import MethodComparison
 from iowbc.reference.labels.dataset import Dataset
 from iowbc.reference.labels.plan import SamplePlan
-from iowbc.reference.region import GentleRegion, LabelledRegion
+from iowbc.reference.region import LabelledRegion, SmoothRegion
 from iowbc.results.picture import write_figure
 
 INK, SOFT, WARM = "#1f3b57", "#8fb1cc", "#d1603d"
@@ -98,7 +98,7 @@ def error_figures(
     write_figure(figure, folder / "joints.png")
 
 
-def gentle_figure(folder: Path, plan: SamplePlan, region: GentleRegion, held: FeasibleMap) -> None:
+def gentle_figure(folder: Path, plan: SamplePlan, region: SmoothRegion, held: FeasibleMap) -> None:
     """The feasible map, and the largest joint move of the reference for one step of the command."""
     figure, (axes,) = _figure(1, 1, 6.0, 4.2)
     shown = _on_grid(axes, plan, region.jump, "Blues_r", 2.0 * plan.recipe.feasible.jump)

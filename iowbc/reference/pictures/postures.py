@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from iowbc.errors import Rejected
 from iowbc.recipe.generator import ReferenceGenerator
-from iowbc.reference.labels.gates import LabelJudge
+from iowbc.reference.labels.gates import LabelChecker
 from iowbc.reference.labels.plan import SamplePlan
 from iowbc.reference.labels.sample import Posture, Sample
 from iowbc.reference.labels.static import StaticMethod
@@ -37,7 +37,7 @@ def draw_strip(path: Path, robot: Robot, recipe: ReferenceGenerator, plan: Sampl
     heights = np.interp((np.arange(HEIGHTS)[::-1] + 0.5) / HEIGHTS, [0.0, 1.0], plan.heights[[0, -1]])
     places = np.linspace(0, len(plan.pitches) - 1, PITCHES).round().astype(int)
     support, model = SupportModel(robot, recipe.problem), _scene(robot)
-    method, judge = StaticMethod(support, recipe.height), LabelJudge(support, recipe.gates, recipe.height)
+    method, judge = StaticMethod(support, recipe.height), LabelChecker(support, recipe.gates, recipe.height)
     figure = Figure(figsize=(1.75 * PITCHES, 1.85 * HEIGHTS), layout="constrained")
     axes = figure.subplots(HEIGHTS, PITCHES)
     with Offscreen(

@@ -35,7 +35,7 @@ from iowbc.recipe.evaluation.evaluation import Drake
 from iowbc.sim.model import GROUND_BIT
 
 FREE = mujoco.mjtJoint.mjJNT_FREE.value
-SPRINGLESS = 1e-9
+MIN_STIFFNESS = 1e-9
 """Stiffness of the actuator that stands for dry friction [N·m/rad]: Drake requires a positive one."""
 MOST_FRICTION = 1.9
 """Greatest coefficient of friction that can be reached: a harmonic mean with 1 stays below 2."""
@@ -111,7 +111,7 @@ class Plant:
         friction = float(model.dof_frictionloss[speed])
         if friction > 0.0:
             brake = self.tree.AddJointActuator(f"{model.actuator(motor).name} friction", joint, friction)
-            brake.set_controller_gains(PdControllerGains(p=SPRINGLESS, d=friction / self.settings.stiction))
+            brake.set_controller_gains(PdControllerGains(p=MIN_STIFFNESS, d=friction / self.settings.stiction))
 
     def _connect(self, row: int) -> Any:
         """The connection of a hand and an object at a site of each."""

@@ -59,7 +59,7 @@ class Appearance:
 def dressed_model(robot: Robot, physics: Physics, scene: Scene, timing: Timing) -> Any:
     """Compiled model with the same positions and velocities as the stepped one, with visual geometry."""
     spec = scene_spec(robot, physics, scene, timing, dressed=True)
-    _dress(spec)
+    _add_visuals(spec)
     meshes = list(installed_meshes(robot))
     if meshes:
         _replace_by_meshes(spec, robot, meshes)
@@ -120,7 +120,7 @@ def _replace_by_meshes(spec: Any, robot: Robot, meshes: list[Mesh]) -> None:
         )
 
 
-def _dress(spec: Any) -> None:
+def _add_visuals(spec: Any) -> None:
     """Sky, checkered ground, one light with shadows."""
     spec.visual.global_.offwidth, spec.visual.global_.offheight = LARGEST_FRAME
     spec.visual.headlight.ambient, spec.visual.headlight.diffuse = (0.45, 0.45, 0.45), (0.35, 0.35, 0.35)

@@ -49,7 +49,9 @@ class Commander:
         if startable; with an object in the hands, at a fraction `holding_start` of the way to it."""
         memory.draws[which] = 0
         self._draw(which, memory, key)
-        command = self._references.startable(self._nominal + self._start[which] * (memory.goal[which] - self._nominal))
+        command = self._references.start_command(
+            self._nominal + self._start[which] * (memory.goal[which] - self._nominal)
+        )
         command[:, VELOCITY] = 0.0
         scripted = self.scripted[which]
         if scripted.any():

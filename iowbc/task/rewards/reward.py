@@ -7,7 +7,7 @@ from operator import attrgetter
 import numpy as np
 
 from iowbc.arrays import Array, Mask
-from iowbc.recipe.task.reward import Kernel, OwnTerm, Reward
+from iowbc.recipe.task.reward import CustomTerm, Kernel, Reward
 from iowbc.task.own_function import load_function
 from iowbc.task.rewards.table import ONCE, TERMS, TRACKED, Step, Term
 
@@ -16,7 +16,7 @@ CONTRACT = "it takes a Step (iowbc/task/rewards/table.py) and returns a finite n
 
 
 @dataclass(frozen=True)
-class Scored:
+class RewardResult:
     """The reward of one step."""
 
     reward: Array
@@ -85,7 +85,7 @@ class RewardFunction:
             if changed not in self._terms:
                 self._terms.append(changed)
 
-    def __call__(self, step: Step, diverged: Mask, level: Array) -> Scored:
+    def __call__(self, step: Step, diverged: Mask, level: Array) -> RewardResult:
         """Reward of one control step at levels of locomotion (n,). `diverged` environments, (n,), get the penalty of a
         fall and no other term."""
         terms = np.zeros((len(step.command), self._columns))
@@ -100,7 +100,7 @@ class RewardFunction:
             part = ((level - later.begin) / (later.end - later.begin)).clip(0.0, 1.0)
             weights = weights + part[:, None] * self._change
         terms *= weights
-        return Scored(reward=terms.sum(axis=1), terms=terms, tracking=tracking)
+        return RewardResult(reward=terms.sum(axis=1), terms=terms, tracking=tracking)
 
 
 def _weighted(column: int, function: Term, setting: float | Kernel, seconds: float) -> WeightedTerm:
@@ -120,7 +120,7 @@ def load_terms(recipe: Reward) -> dict[str, Callable[[Step], Array]]:
     return {name: _own_term(name, term) for name, term in recipe.own_terms.items()}
 
 
-def _own_term(name: str, term: OwnTerm) -> Callable[[Step], Array]:
+def _own_term(name: str, term: CustomTerm) -> Callable[[Step], Array]:
     function = load_function(f"task.reward.own.{name}", term, CONTRACT)
 
     def value(step: Step) -> Array:

@@ -31,7 +31,7 @@ SLICE = 0.5
 """Timeouts are counted in waits of this length [s], so that a suspended machine does not use them up."""
 STEPS = COUNTERS.index("steps")
 """Column of the counters that shows a worker's progress."""
-DUMPING = 0.5
+TRACEBACK_TIME = 0.5
 """Time for a hung worker to write its traceback [s]."""
 
 
@@ -187,7 +187,7 @@ class WorkerProcesses:
         who = f"worker {index} (process {process.popen.pid}, environments {first} to {last - 1})"
         if hung is not None:
             process.popen.send_signal(signal.SIGUSR1)
-            time.sleep(DUMPING)
+            time.sleep(TRACEBACK_TIME)
             what = f"has not answered for {hung:g} s"
         elif text:
             what = "failed"

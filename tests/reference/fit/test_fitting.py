@@ -13,7 +13,7 @@ from iowbc.errors import Interrupted
 from iowbc.pipeline.stage import Job
 from iowbc.recipe.generator import Fit, FitGates, ReferenceGenerator, SmoothnessCheck
 from iowbc.reference.fit.fitting import FitData, fit
-from iowbc.reference.fit.gates import judge_fit, measure_jumps
+from iowbc.reference.fit.gates import check_fit, measure_jumps
 from iowbc.reference.fit.preparation import split_by_group
 from iowbc.reference.fit.task_error import TaskErrors, TaskKinematics
 from iowbc.reference.labels.dataset import Dataset
@@ -172,7 +172,7 @@ def judged(gates: FitGates, dataset: Dataset, bend: float) -> Any:
     predicted[7, 3] += bend
     zero = np.zeros(20)
     errors = TaskErrors(zero, zero, zero, zero, np.full(20, 0.08))
-    return judge_fit(gates, dataset, held, predicted, errors, np.array([0.01]))
+    return check_fit(gates, dataset, held, predicted, errors, np.array([0.01]))
 
 
 def test_a_missed_gate_is_named_with_its_worst_samples(dataset_job: Job) -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from iowbc.errors import Rejected
 from iowbc.recipe.generator import LabelGates, ReferenceGenerator
-from iowbc.reference.labels.gates import LabelJudge
+from iowbc.reference.labels.gates import LabelChecker
 from iowbc.reference.labels.sample import Posture, Sample
 from iowbc.reference.labels.static import StaticMethod
 from iowbc.reference.labels.support_model import SupportModel
@@ -26,8 +26,8 @@ def label(support: SupportModel, sample: Sample) -> Posture:
 
 
 @pytest.fixture(scope="module")
-def judge(support: SupportModel) -> LabelJudge:
-    return LabelJudge(support, LabelGates(), "pelvis")
+def judge(support: SupportModel) -> LabelChecker:
+    return LabelChecker(support, LabelGates(), "pelvis")
 
 
 def moved(support: SupportModel, posture: Posture, **tangent: float) -> Posture:
@@ -39,7 +39,7 @@ def moved(support: SupportModel, posture: Posture, **tangent: float) -> Posture:
     return Posture(pinocchio.integrate(support.model, posture.configuration, step), posture.wrench)
 
 
-def test_a_good_label_passes_with_its_evidence(judge: LabelJudge, sample: Sample, label: Posture) -> None:
+def test_a_good_label_passes_with_its_evidence(judge: LabelChecker, sample: Sample, label: Posture) -> None:
     evidence = judge.label(sample, label)
     assert evidence.height == pytest.approx(0.66, abs=0.002)
     assert 0.04 < evidence.margin < 0.12
@@ -48,7 +48,7 @@ def test_a_good_label_passes_with_its_evidence(judge: LabelJudge, sample: Sample
 
 
 def test_a_label_of_other_arms_is_not_in_equilibrium(
-    support: SupportModel, judge: LabelJudge, sample: Sample, label: Posture, carrying: Any
+    support: SupportModel, judge: LabelChecker, sample: Sample, label: Posture, carrying: Any
 ) -> None:
     stretched = carrying.copy()
     stretched[[0, 7]] -= 0.8  # shoulder pitch
@@ -60,25 +60,27 @@ def test_a_label_of_other_arms_is_not_in_equilibrium(
 
 @pytest.mark.parametrize("joint", ["left_ankle_pitch_joint", "right_hip_roll_joint", "left_knee_joint"])
 def test_a_moved_foot_is_rejected(
-    support: SupportModel, judge: LabelJudge, sample: Sample, label: Posture, joint: str
+    support: SupportModel, judge: LabelChecker, sample: Sample, label: Posture, joint: str
 ) -> None:
     with pytest.raises(Rejected, match="feet"):
         judge.label(sample, moved(support, label, **{joint: 0.02}))
 
 
-def test_another_height_or_torso_is_rejected(judge: LabelJudge, label: Posture, command: Callable[..., Sample]) -> None:
+def test_another_height_or_torso_is_rejected(
+    judge: LabelChecker, label: Posture, command: Callable[..., Sample]
+) -> None:
     with pytest.raises(Rejected, match="height"):
         judge.label(command(0.675, 0.3), label)
     with pytest.raises(Rejected, match="orientation"):
         judge.label(command(0.66, 0.34), label)
 
 
-def test_wrenches_that_do_not_carry_the_robot_are_rejected(judge: LabelJudge, sample: Sample, label: Posture) -> None:
+def test_wrenches_that_do_not_carry_the_robot_are_rejected(judge: LabelChecker, sample: Sample, label: Posture) -> None:
     with pytest.raises(Rejected, match="equilibrium"):
         judge.label(sample, Posture(label.configuration, 0.99 * label.wrench))
 
 
-def test_a_foot_that_pulls_is_rejected(judge: LabelJudge, sample: Sample, label: Posture) -> None:
+def test_a_foot_that_pulls_is_rejected(judge: LabelChecker, sample: Sample, label: Posture) -> None:
     """All weight on the right, and more, with the couple that this takes made by the soles' moments."""
     wrench = label.wrench.copy()
     shift = wrench[0, 2] + 5.0
@@ -91,28 +93,30 @@ def test_a_foot_that_pulls_is_rejected(judge: LabelJudge, sample: Sample, label:
 
 
 def test_a_heavy_load_fails_the_torque_gate(
-    support: SupportModel, judge: LabelJudge, sample: Sample, label: Posture, recipe: ReferenceGenerator
+    support: SupportModel, judge: LabelChecker, sample: Sample, label: Posture, recipe: ReferenceGenerator
 ) -> None:
     weak = SupportModel(support.robot, recipe.problem.model_copy(update={"effort_fraction": 0.05}))
     weak.lock(sample)
     with pytest.raises(Rejected, match="torque"):
-        LabelJudge(weak, LabelGates(), "pelvis").label(sample, label)
+        LabelChecker(weak, LabelGates(), "pelvis").label(sample, label)
 
 
 def test_a_small_support_margin_is_rejected(support: SupportModel, sample: Sample, label: Posture) -> None:
-    strict = LabelJudge(support, LabelGates(support_margin=0.2), "pelvis")
+    strict = LabelChecker(support, LabelGates(support_margin=0.2), "pelvis")
     with pytest.raises(Rejected, match="support margin"):
         strict.label(sample, label)
 
 
-def test_numbers_that_are_not_finite_are_rejected(judge: LabelJudge, sample: Sample, label: Posture) -> None:
+def test_numbers_that_are_not_finite_are_rejected(judge: LabelChecker, sample: Sample, label: Posture) -> None:
     broken = label.configuration.copy()
     broken[9] = np.nan
     with pytest.raises(Rejected, match="not finite"):
         judge.label(sample, Posture(broken, label.wrench))
 
 
-def test_crossed_arms_are_rejected_before_anything_is_solved(judge: LabelJudge, sample: Sample, carrying: Any) -> None:
+def test_crossed_arms_are_rejected_before_anything_is_solved(
+    judge: LabelChecker, sample: Sample, carrying: Any
+) -> None:
     judge.arms(sample)
     crossed = carrying.copy()
     crossed[1], crossed[8] = -0.6, 0.6  # shoulder roll inward

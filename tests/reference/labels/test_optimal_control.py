@@ -10,7 +10,7 @@ from iowbc.pipeline.stage import Job
 from iowbc.recipe.generator import LabelGates, PostureProblem, ReferenceGenerator
 from iowbc.reference.labels.checks import chosen_for_crosscheck, compare_methods
 from iowbc.reference.labels.dataset import Dataset
-from iowbc.reference.labels.gates import LabelJudge
+from iowbc.reference.labels.gates import LabelChecker
 from iowbc.reference.labels.gauss_newton import KinematicStart
 from iowbc.reference.labels.optimal_control import OptimalControlMethod, distribute
 from iowbc.reference.labels.plan import SamplePlan
@@ -50,7 +50,7 @@ def test_its_waist_takes_the_lean_as_that_of_static_labels_does(robot: Robot, co
 def test_its_postures_pass_the_physical_gates(
     method: OptimalControlMethod, support: SupportModel, command: Callable[..., Sample]
 ) -> None:
-    judge = LabelJudge(support, LabelGates(), "pelvis")
+    judge = LabelChecker(support, LabelGates(), "pelvis")
     for height, pitch in COMMANDS:
         sample = command(height, pitch)
         judge.label(sample, method.solve(sample))
