@@ -1,4 +1,4 @@
-"""The way of a recipe in docs/architecture.md is the one that a run takes."""
+"""The path of a recipe in docs/architecture.md is that of a run."""
 
 import re
 import subprocess
@@ -41,12 +41,12 @@ main(["run", "recipes/quickstart.yaml", "--quiet", "--set", "execution.track=fal
 
 
 @pytest.mark.integration
-def test_the_way_of_a_recipe_is_told_whole_and_in_few_functions(tmp_path: Path) -> None:
+def test_the_documented_path_of_a_recipe_is_complete_and_short(tmp_path: Path) -> None:
     words = [sys.executable, "-c", TRACED, str(ROOT / "iowbc"), str(tmp_path)]
     done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True)
-    section = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8").split("## The way of a")[1]
+    section = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8").split("## Path of a")[1]
     rows = [row.split("|")[2] for row in section.splitlines() if row.startswith("| `iowbc/")]
     told = {name for row in rows for name in re.findall(r"`(?:\w+\.)?(_?[a-z_]+)`", row)}
     entered = done.stdout.split()
     assert len(entered) + len(["load_recipe"]) <= 24
-    assert set(entered) <= told, "docs/architecture.md does not tell of all"
+    assert set(entered) <= told, "docs/architecture.md lacks functions"
