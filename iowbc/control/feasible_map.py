@@ -50,7 +50,7 @@ class FeasibleMap(Constants):
         return cls(pitch, np.full(2, height), np.full(2, height))
 
     def contains(self, height: Array, pitch: Array) -> NDArray[np.bool_]:
-        """Whether commands are inside, shape (n,)."""
+        """True where commands are inside, shape (n,)."""
         clamped_height, clamped_pitch = self.clamp(height, pitch)
         return (clamped_height == height) & (clamped_pitch == pitch)
 

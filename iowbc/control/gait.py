@@ -14,14 +14,14 @@ phase_mirror = in_place(-1.0, -1.0)
 
 
 def wants_to_move(command: Array, gait: GaitPrior) -> Mask:
-    """Whether the commanded velocity requires steps; command (n, 11), result (n,)."""
+    """True where the commanded velocity requires steps; command (n, 11), result (n,)."""
     xp = namespace(command)
     speed = xp.sqrt(command[:, 0] ** 2 + command[:, 1] ** 2)
     return (speed > gait.moving_speed) | (xp.abs(command[:, 2]) > gait.moving_yaw_rate)
 
 
 def is_falling(measured: Measured, pelvis_pitch: Array, recovery: Recovery) -> Mask:
-    """Whether the base is tipping over; `pelvis_pitch` of the reference posture (n,) [rad], result (n,).
+    """True where the base is tipping over; `pelvis_pitch` of the reference posture (n,) [rad], result (n,).
 
     Pitch and roll of the measured gravity, less the reference's, and their rates by the gyroscope.
     """

@@ -61,7 +61,7 @@ class Learner:
         env.seed(seed)
         self.settings, self.env, self.device = teacher, env, torch.device(device)
         self._on_cpu = self.device.type == "cpu"
-        self.side_by_side = ParallelBatch(teacher.parts if self._on_cpu else 1, cores)
+        self.in_parallel = ParallelBatch(teacher.parts if self._on_cpu else 1, cores)
         self._arguments = _policy_arguments(teacher, env, mirrors, value_only)
         self.policy = ActorCritic(
             env.observation_space,
@@ -147,10 +147,10 @@ class Learner:
         samples, settings, shape = self.samples, self.settings, found.reward.shape
         columns = samples.columns
         rows = found.observation[:-1].reshape(shape[0] * shape[1], -1)
-        prepared = torch.cat(self.side_by_side(self._prepare, self._tensor(rows)))
+        prepared = torch.cat(self.in_parallel(self._prepare, self._tensor(rows)))
         columns["observation"].copy_(prepared.view(*shape, -1))
         columns["action"].copy_(self._tensor(found.action))
-        self.side_by_side(self._judge, samples.flat)
+        self.in_parallel(self._judge, samples.flat)
         columns["neighbours"].copy_(neighbours(columns["mean"], found.ended))
         steps = zip(found.reward, found.ended, strict=True)
         rewards = np.stack([self.normalization.reward(reward, ended) for reward, ended in steps])
@@ -232,7 +232,7 @@ class Learner:
             share = len(part) / size
             return torch.autograd.grad(share * loss, parameters), share * figures
 
-        gradients, figures = zip(*self.side_by_side(gradient, batch), strict=True)
+        gradients, figures = zip(*self.in_parallel(gradient, batch), strict=True)
         for parameter, *parts in zip(parameters, *gradients, strict=True):
             parameter.grad = torch.stack(parts).sum(0) if len(parts) > 1 else parts[0]
         torch.nn.utils.clip_grad_norm_(parameters, self.settings.gradient_norm)

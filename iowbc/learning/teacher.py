@@ -21,7 +21,7 @@ from iowbc.recipe.teacher import Teacher
 
 FLOOR_REACHED = 1.01
 """A standard deviation within this factor of its floor counts as at the floor."""
-DEAD = 0.5
+COLLAPSED_SHARE = 0.5
 """Reaching a floor below this fraction of `std_end` counts as loss of exploration; a higher floor is intended."""
 
 Score = Callable[[Policy], Mapping[str, float]]
@@ -88,11 +88,11 @@ class TeacherTraining:
     def _judged(self, training: Mapping[str, float]) -> dict[str, float]:
         """Finite statistics of an update and its check; rolls back if they show a collapse."""
         figures = {name: value for name, value in training.items() if np.isfinite(value)}
-        deviation = self.model.policy.log_std.detach().exp()
+        deviation, floor = self.model.policy.log_std.detach().exp(), self.settings.std_floor
         why = ""
         if len(figures) < len(training) or not self.model.policy.finite():
             why = "the networks diverged"
-        elif float(deviation.mean()) <= FLOOR_REACHED * self.settings.std_floor < DEAD * self.settings.std_end:
+        elif float(deviation.mean()) <= FLOOR_REACHED * floor < COLLAPSED_SHARE * self.settings.std_end:
             why = "exploration died out"
         elif self.score is not None and self._updates % (self.settings.check.every or 1) == 0:
             found = {f"check/{name}": float(value) for name, value in self.score(policy_of(*self.network())).items()}

@@ -91,7 +91,7 @@ class ExternalInput:
 
 @dataclass(frozen=True)
 class Presentation:
-    """How commands and reports present a stage's artifacts."""
+    """Presentation of a stage's artifacts in commands and reports."""
 
     headline: tuple[str, ...] = ()
     """Patterns of the metrics that are shown at the end of a run, the most telling first; `show` has all."""

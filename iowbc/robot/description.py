@@ -225,7 +225,7 @@ def _support(names: list[str], joints: tuple[str, ...], source: Path) -> Indices
 
 
 def _is_pitch(hinge: Hinge) -> bool:
-    """Whether a hinge turns about the y axis of its body."""
+    """True if a hinge turns about the y axis of its body."""
     return bool(np.argmax(np.abs(hinge.axis)) == 1)
 
 

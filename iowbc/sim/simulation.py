@@ -118,13 +118,13 @@ class Simulation:
 
     @property
     def infeasible(self) -> NDArray[np.bool_]:
-        """Whether a crate's rolling resistance exceeds the friction between feet and ground, (n,)."""
+        """True where a crate's rolling resistance exceeds the friction between feet and ground, (n,)."""
         hold = self.drawn["ground_friction"] * self._robot_mass * GRAVITY
         return self.drawn["rolling_resistance"] > hold
 
     @property
     def disturbed(self) -> NDArray[np.bool_]:
-        """Whether an impulse or a push acts in this control period, (n,)."""
+        """True where an impulse or a push acts in this control period, (n,)."""
         return np.logical_or(self._impulses.force.any(axis=1), self._pushes.force.any(axis=1))
 
     @property

@@ -37,7 +37,7 @@ class Soles:
         }
 
     def _pressure(self) -> tuple[Array, Array]:
-        """Whether each foot is in contact, (n, 2), and its centre of pressure on the ground from the robot's centre of
+        """Contact of each foot, (n, 2) bool, and its centre of pressure on the ground from the robot's centre of
         mass, (n, 2, 3) [m]."""
         torque, force = self._wrench[..., :3], self._wrench[..., 3:]
         loaded = force[..., 2] > self._lightest

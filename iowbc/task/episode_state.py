@@ -41,11 +41,11 @@ class EpisodeState:
     played: Array
     """Effective levels of the episode, (n, axes); see `iowbc.task.curriculum.played_levels`."""
     walking: Array
-    """Whether the episode commands velocities, (n,) bool."""
+    """True where the episode commands velocities, (n,) bool."""
     infeasible: Array
-    """Whether the crate's rolling resistance exceeds the friction of the feet, (n,) bool."""
+    """True where the crate's rolling resistance exceeds the friction of the feet, (n,) bool."""
     failed: Array
-    """Whether the episode of `failed_key` has not been survived since, (n,) bool."""
+    """True where the episode of `failed_key` has not been survived since, (n,) bool."""
     failed_key: Array
     """Key of the last failed episode, (n,) uint64."""
     command: Array
@@ -57,7 +57,7 @@ class EpisodeState:
     phase: Array
     """Gait phase, (n,)."""
     stepping: Array
-    """Whether the gait clock runs, (n,) bool."""
+    """True where the gait clock runs, (n,) bool."""
     feedback: Array
     """Forward offset of left foot, right foot and both from their places in the stride, stretch of both legs [m], and
     turn of both hips [rad], (n, 5)."""

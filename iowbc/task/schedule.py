@@ -55,7 +55,7 @@ class Schedule:
 
     @property
     def repeats(self) -> bool:
-        """Whether a reset begins the same episodes again."""
+        """True if a reset begins the same episodes again."""
         return self._trials is not None
 
     def reseed(self, seeds: NDArray[np.uint64]) -> None:

@@ -26,9 +26,9 @@ class Admittance:
         held, pushed = (np.inf if damping is None else damping for damping in (recipe.held, recipe.pushed))
         self._damping = np.where(holding, held, pushed)
         self.rigid = bool(np.isinf(self._damping).all())
-        """Whether no force changes any velocity."""
+        """True if no force changes any velocity."""
         self.idle = self.rigid and recipe.force == 0.0
-        """Whether forces change nothing at all."""
+        """True if forces change nothing at all."""
 
     def _beyond(self, force: Array) -> tuple[Array, Array]:
         """Sizes of forces (n, 2) beyond the margin, (n,) [N], and the forces of these sizes, (n, 2) [N]."""

@@ -39,6 +39,8 @@ VARIANTS_PER_PANEL = 4
 """Number of variants whose bars fit into a panel of `PANEL_WIDTH`; with more, it is wider."""
 LONGEST_TEXT = 5
 """With more than `VARIANTS_PER_PANEL` variants, texts above bars with more characters than this are rotated."""
+TITLE_WIDTH = 110
+"""Characters in a line of the title above panels that are two in a row."""
 LABEL_WIDTH = 11
 """Characters in a line under a bar."""
 SHIFT = 0.012
@@ -66,7 +68,7 @@ def errors_against_mass(summary: pd.DataFrame, suite: str) -> Figure:
         _sweep_panel(axes, chosen, variants_of(summary), name, chosen[f"still_{name}"].mean(), itemgetter(place))
         axes.set(ylabel=LABELS[name], xlabel="" if place < 2 else f"{chosen['kind'].iloc[0]} mass [kg]")
     heading = f"Tracking errors against {chosen['kind'].iloc[0]} mass, bars: 95 % intervals. {conditions(chosen)}"
-    return finish(figure, [], f"{heading}\n{_note(_with_paper(chosen))}", panels[0])
+    return finish(figure, [], f"{textwrap.fill(heading, TITLE_WIDTH)}\n{_note(_with_paper(chosen))}", panels[0])
 
 
 def comparison(summary: pd.DataFrame, capacity_rate: float) -> Figure:

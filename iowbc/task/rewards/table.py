@@ -53,9 +53,9 @@ class Step:
     swing_profile: Array
     """Sole heights of the gait prior, (n, 2) [m]."""
     stepping: Mask
-    """Whether the gait clock runs, (n,)."""
+    """True where the gait clock runs, (n,)."""
     commanded: Mask
-    """Whether a velocity is commanded, (n,)."""
+    """True where a velocity is commanded, (n,)."""
     stance: Mask
     """Feet that should be on the ground, (n, 2)."""
     held: Mask

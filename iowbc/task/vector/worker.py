@@ -32,7 +32,7 @@ class Message:
     arguments: tuple[Any, ...] = ()
     named: Mapping[str, Any] = field(default_factory=dict)
     changes: bool = True
-    """Whether the call changes the environments' state."""
+    """True if the call changes the environments' state."""
 
     @classmethod
     def of(cls, method: Callable[Concatenate[Any, Given], Any], *arguments: Given.args, **named: Given.kwargs) -> Self:
