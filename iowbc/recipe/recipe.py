@@ -20,7 +20,7 @@ from iowbc.recipe.teacher import Teacher
 StageName = Literal["rg-dataset", "rg-fit", "teacher", "distill", "eval", "export", "skill", "skill-eval"]
 PIPELINE: tuple[StageName, ...] = get_args(StageName)
 """All stages, in the order in which they run."""
-CONTROLLER: tuple[StageName, ...] = PIPELINE[:6]
+CONTROLLER: tuple[StageName, ...] = ("rg-dataset", "rg-fit", "teacher", "distill", "eval", "export")
 """Stages of the controller, without those of the skill layer above it."""
 
 SEEDS = ("seed", "teacher.seed", "distill.seed", "skill.learning.seed")
