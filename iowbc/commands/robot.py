@@ -219,9 +219,10 @@ def _show(twin: "Twin", view: "RemoteView") -> None:
     if (asked := view.asked()) is None:
         return
     simulation, support = twin.simulation, twin.support
-    if asked.release:
+    released, pulls = asked
+    if released:
         support.let_go()
-    simulation.planned_push[0] = asked.pulls["robot"]
-    simulation.planned_impulse[0] = asked.pulls["object"] if simulation.state.has_object[0] else 0.0
+    simulation.planned_push[0] = pulls["robot"]
+    simulation.planned_impulse[0] = pulls["object"] if simulation.state.has_object[0] else 0.0
     held = f", held by {support.kind}" if support.waits else ""
     view.answer(twin.time, (twin.band,), f"{twin.verdict}{held}", support.waits)

@@ -48,15 +48,13 @@ def _draw(run: "LoggedRun", path: Path) -> None:
     """Plot command and measured motion over time as PNG."""
     from matplotlib.figure import Figure
 
-    from iowbc.control.command import HEIGHT, PITCH, YAW_RATE
+    from iowbc.control.command import HEIGHT, PITCH
     from iowbc.results.picture import COLOURS, write_figure
 
-    period = np.diff(run.time, prepend=run.time[0])
-    turned = run.heading[0] + np.cumsum(run.command[:, YAW_RATE] * period)
     rows = (
         ("forward velocity [m/s]", run.command[:, 0], run.velocity[:, 0]),
         ("sideways velocity [m/s]", run.command[:, 1], run.velocity[:, 1]),
-        ("heading [rad]", turned, run.heading),
+        ("heading [rad]", run.wanted_heading, run.heading),
         ("pelvis height [m]", run.command[:, HEIGHT], run.height),
         ("torso pitch [rad]", run.command[:, PITCH], run.pitch),
     )

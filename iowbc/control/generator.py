@@ -33,7 +33,6 @@ class ReferenceNetwork(Constants):
     lower: Array
     upper: Array
     """Joint limits of the outputs [rad]."""
-    activation: str = "elu"
 
     def __call__(self, arm_reference: Array, base_command: Array) -> Array:
         """Support reference (n, 15) [rad] for arms (n, 14) [rad] and base commands (n, 2): height [m], pitch [rad]."""
@@ -62,7 +61,7 @@ class ReferenceNetwork(Constants):
             "inputs": self.inputs,
             "outputs": self.outputs,
             "hidden": [len(bias) for _, bias in self.layers[:-1]],
-            "activation": self.activation,
+            "activation": "elu",
             "output": "clip(network * output_std + output_mean, lower, upper) [rad]",
         }
         (folder / ARCHITECTURE).write_text(json.dumps(architecture, indent=2) + "\n", encoding="utf-8")

@@ -1,33 +1,24 @@
 """Leg odometry: speed ahead and height of the base, from the angles of the legs and the inertial unit."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import reduce
 from operator import add
-from typing import Self
 
 from iowbc.arrays import Array, Constants
-from iowbc.control.legs import Legs, direction, leg_geometry, leg_joints, pitched
+from iowbc.control.legs import direction, leg_geometry, leg_joints, pitched
 from iowbc.control.sensors import Measured
 from iowbc.control.stride import ANKLE_PITCH, HIP_PITCH, KNEE
 from iowbc.robot.description import Robot
 
 
-@dataclass(frozen=True)
 class LegOdometry(Constants):
     """The legs of a robot in the sagittal plane. Holds constants only."""
 
-    legs: Legs
-    joints: tuple[tuple[int, ...], ...]
-    """Places of hip pitch, knee and ankle pitch, left and right, among all joints."""
-
-    @classmethod
-    def of(cls, robot: Robot) -> Self:
-        left, right = leg_joints(robot)
-        places = tuple(
-            (int(robot.support[left[j]]), int(robot.support[right[j]])) for j in (HIP_PITCH, KNEE, ANKLE_PITCH)
-        )
-        return cls(leg_geometry(robot), places)
+    def __init__(self, robot: Robot) -> None:
+        self._legs = leg_geometry(robot)
+        left, right = (robot.support[leg].tolist() for leg in leg_joints(robot))
+        self._joints = [[left[joint], right[joint]] for joint in (HIP_PITCH, KNEE, ANKLE_PITCH)]
+        """Places of the legs' joints, left and right, among all joints."""
 
     def speed(self, measured: Measured) -> Array:
         """Forward speed of the base if the respective foot were at rest on the ground, (n, 2) [m/s]."""
@@ -39,10 +30,10 @@ class LegOdometry(Constants):
 
     def _segments(self, measured: Measured) -> Iterator[tuple[Array, Array]]:
         """Pitch rate [rad/s] and rise [m] of hip, thigh, shank and sole from the base outward, (n, 2) each."""
-        legs, angle = self.legs, measured.pitch[:, None]
+        legs, angle = self._legs, measured.pitch[:, None]
         rate = measured.base_angular_velocity[:, 1:2]
         yield rate, pitched(direction(angle), *legs.hip)[1]
-        for joint, segment in zip(self.joints, (legs.thigh, legs.shank, legs.sole), strict=True):
-            angle = angle + measured.joint_position[:, list(joint)]
-            rate = rate + measured.joint_velocity[:, list(joint)]
+        for joint, segment in zip(self._joints, (legs.thigh, legs.shank, legs.sole), strict=True):
+            angle = angle + measured.joint_position[:, joint]
+            rate = rate + measured.joint_velocity[:, joint]
             yield rate, pitched(direction(angle), *segment)[1]

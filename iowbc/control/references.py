@@ -13,10 +13,8 @@ from iowbc.control.arms import ArmKinematics
 from iowbc.control.chain import Frames
 from iowbc.control.command import HEIGHT, OFFSET, PITCH
 from iowbc.control.feasible_map import FEASIBLE, FeasibleMap
-from iowbc.control.foothold import FootPlacement
+from iowbc.control.feedback import FootPlacement, HipFeedback, LegStretch
 from iowbc.control.gravity import ArmGravity
-from iowbc.control.height import LegStretch
-from iowbc.control.hips import HipFeedback
 from iowbc.control.sensors import Measured
 from iowbc.control.stride import Stride
 from iowbc.recipe.task.joint_references import References
@@ -55,11 +53,12 @@ class ReferenceLayer(Constants):
         self.default_support = robot.default_position[robot.support]
         self.default_height = robot.default_height
         self.waist, self._waist_pitch = as_slice(robot.waist), as_slice(robot.waist_pitch)
-        self._settings = references.gait
-        self._stride = Stride.of(robot, references.gait, held=references.height is not None)
-        self._placement = FootPlacement.of(robot, references.gait)
-        self._legs = LegStretch.of(robot, references.height)
-        self._hips = HipFeedback.of(robot, references.torso)
+        self._settings = prior = references.gait
+        height, torso = references.height, references.torso
+        self._stride = Stride(robot, prior, held=height is not None) if prior.enabled else None
+        self._placement = None if prior.placement is None else FootPlacement(robot, prior, prior.placement)
+        self._legs = None if height is None else LegStretch(robot, height)
+        self._hips = None if torso is None else HipFeedback(robot, torso)
 
     def clamp(self, command: Array) -> Array:
         """The command with height and torso pitch brought into the feasible map; (n, 11)."""

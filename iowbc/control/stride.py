@@ -7,9 +7,6 @@ and yaw and ankle roll to first order; the ankles keep the soles parallel to whe
 stays in its range.
 """
 
-from dataclasses import dataclass
-from typing import Self
-
 import numpy as np
 
 from iowbc.arrays import Array, Constants, namespace
@@ -22,43 +19,21 @@ from iowbc.robot.description import Robot
 HIP_PITCH, HIP_ROLL, HIP_YAW, KNEE, ANKLE_PITCH, ANKLE_ROLL = range(6)
 
 
-@dataclass(frozen=True)
 class Stride(Constants):
     """The gait prior of a robot. Holds constants only."""
 
-    settings: GaitPrior
-    legs: Legs
-    joints: tuple[tuple[int, int], ...]
-    """Places of each joint of the legs, left and right, among the support joints."""
-    spread: Array
-    """Lateral offset of each sole from its place in the posture, positive to the left, (2,) [m]."""
-    order: tuple[int, ...]
-    """For each support joint its place among those of the legs, or among the zeros after them."""
-    lower: Array
-    upper: Array
-    """Ranges of the support joints [rad]."""
-    held: float
-    """One if the height feedback also acts while the robot stands, else zero."""
-
-    @classmethod
-    def of(cls, robot: Robot, settings: GaitPrior, held: bool = False) -> Self | None:
-        """The prior of a robot, or none where it is switched off. Raises ValueError for legs of another kind."""
-        if not settings.enabled:
-            return None
-        left, right = leg_joints(robot)
-        moved = [joint for pair in zip(left, right, strict=True) for joint in pair]
+    def __init__(self, robot: Robot, settings: GaitPrior, held: bool = False) -> None:
+        """`held`: the height feedback also acts while the robot stands. Raises ValueError for legs of another kind."""
+        self._joints = [list(pair) for pair in zip(*leg_joints(robot), strict=True)]
+        """Places of each joint of the legs, left and right, among the support joints."""
+        self._settings, self.legs, self._held = settings, leg_geometry(robot), float(held)
+        self._spread = settings.spread * np.sign(self.legs.side)
+        """Lateral offset of each sole from its place in the posture, positive to the left, (2,) [m]."""
+        moved = [joint for pair in self._joints for joint in pair]
         others = [joint for joint in range(len(robot.support)) if joint not in moved]
-        legs = leg_geometry(robot)
-        return cls(
-            settings=settings,
-            legs=legs,
-            spread=settings.spread * np.sign(legs.side),
-            joints=tuple(zip(left, right, strict=True)),
-            order=tuple(np.argsort([*moved, *others]).tolist()),
-            lower=robot.lower[robot.support],
-            upper=robot.upper[robot.support],
-            held=float(held),
-        )
+        self._order = np.argsort([*moved, *others]).tolist()
+        """For each support joint its place among those of the legs, or among the zeros after them."""
+        self._lower, self._upper = robot.lower[robot.support], robot.upper[robot.support]
 
     def __call__(
         self,
@@ -77,26 +52,26 @@ class Stride(Constants):
         both legs [m].
         """
         xp, legs, pitch = namespace(posture), self.legs, pelvis_pitch[:, None]
-        hip, knee = posture[:, list(self.joints[HIP_PITCH])], posture[:, list(self.joints[KNEE])]
+        hip, knee = posture[:, self._joints[HIP_PITCH]], posture[:, self._joints[KNEE]]
         thigh = pitch + hip
         x, z = pitched(direction(thigh), *_ankle(legs, knee))
         ahead, left, up, turn = self._soles(pitch, x, command, phase, stepping)
         if feedback is not None:
             ahead, up = ahead + feedback[:, :2] + feedback[:, 2:3], up - feedback[:, 3:4]
         bent, angle = self._bent(x + ahead, z + up)
-        moved = stepping[:, None] + self.held * (1.0 - stepping[:, None])
+        moved = stepping[:, None] + self._held * (1.0 - stepping[:, None])
         change, bend = (angle - thigh) * moved, (bent - knee) * moved
         hip_roll, hip_yaw, ankle_roll = _sideways(legs, thigh + change, knee + bend, left, turn)
         joints = [change, hip_roll, hip_yaw, bend, -change - bend, ankle_roll]
-        others = 0.0 * posture[:, : len(self.order) - 2 * len(joints)]
-        changes = xp.concatenate([*joints, others], -1)[:, list(self.order)]
-        return (posture + changes).clip(self.lower, self.upper)
+        others = 0.0 * posture[:, : len(self._order) - 2 * len(joints)]
+        changes = xp.concatenate([*joints, others], -1)[:, self._order]
+        return (posture + changes).clip(self._lower, self._upper)
 
     def _soles(
         self, pitch: Array, ankle_x: Array, command: Array, phase: Array, stepping: Array
     ) -> tuple[Array, Array, Array, Array]:
         """Displacements of the soles from the posture, (n, 2) each: ahead, to the left, up [m], turned [rad]."""
-        xp, gait, legs = namespace(phase), self.settings, self.legs
+        xp, gait, legs = namespace(phase), self._settings, self.legs
         foot = foot_phase(phase)
         swing = swing_progress(foot, gait.stance)
         time = gait.stance / gait.frequency * gait.stride
@@ -105,8 +80,8 @@ class Stride(Constants):
         place_x = xp.cos(pitch) * legs.hip[0] + xp.sin(pitch) * legs.hip[1] + ankle_x + legs.sole[0]
         sway = gait.sway * (xp.sin(2.0 * np.pi * phase) * stepping)[:, None]
         return (
-            part * (command[:, 0:1] - rate * (legs.side + self.spread)),
-            part * (command[:, 1:2] + rate * place_x) - sway + self.spread,
+            part * (command[:, 0:1] - rate * (legs.side + self._spread)),
+            part * (command[:, 1:2] + rate * place_x) - sway + self._spread,
             swing_height(swing, gait) * stepping[:, None],
             part * rate,
         )
@@ -118,7 +93,7 @@ class Stride(Constants):
         """
         legs = self.legs
         cosine = (x * x + z * z - legs.thigh_squared - legs.shank_squared) / legs.twice_product
-        knee = namespace(x).arccos(cosine.clip(-1.0, float(np.cos(self.settings.straightest_knee)))) - legs.crooked
+        knee = namespace(x).arccos(cosine.clip(-1.0, float(np.cos(self._settings.straightest_knee)))) - legs.crooked
         return knee, _forward(x, z) - _forward(*_ankle(legs, knee))
 
 

@@ -16,7 +16,7 @@ from iowbc.control.generator import ARCHITECTURE, WEIGHTS
 from iowbc.deploy.exported_folder import CONTRACT, GENERATOR, ROBOT, SETTLE, STEP
 from iowbc.errors import ContractBroken
 from iowbc.files import file_digest
-from iowbc.recipe.section import Section, sentences
+from iowbc.recipe.section import NonNegative, Section, sentences
 from iowbc.recipe.simulation.simulation import SensorNoise
 from iowbc.recipe.task.commands import Commands
 from iowbc.recipe.task.joint_references import References
@@ -98,13 +98,13 @@ class Contract(Section):
     """Places of the support joints in `joints`, in the order of every 15-vector."""
     interaction: tuple[int, ...]
     """Places of the arm joints in `joints`, in the order of `arm_reference`."""
-    kp: tuple[float, ...]
+    kp: tuple[NonNegative, ...]
     """Position gains of the PD loop, all joints [N·m/rad]."""
-    kd: tuple[float, ...]
+    kd: tuple[NonNegative, ...]
     """Velocity gains of the PD loop, all joints [N·m·s/rad]."""
-    effort: tuple[float, ...]
+    effort: tuple[NonNegative, ...]
     """Torque limits [N·m]."""
-    velocity_limit: tuple[float, ...]
+    velocity_limit: tuple[NonNegative, ...]
     """Joint speed limits [rad/s]."""
     lower: tuple[float, ...]
     """Lower joint limits [rad]."""
@@ -146,7 +146,7 @@ class Contract(Section):
         joints = len(self.joints)
         for name in ("kp", "kd", "effort", "velocity_limit", "lower", "upper", "default_position"):
             values = getattr(self, name)
-            if len(values) != joints or not all(map(math.isfinite, values)):
+            if len(values) != joints:
                 raise ValueError(f"{name}: {len(values)} numbers {values} for {joints} joints")
         if sorted((*self.support, *self.interaction)) != list(range(joints)):
             raise ValueError(f"support {self.support} and interaction {self.interaction} do not cover {joints} joints")
@@ -155,10 +155,6 @@ class Contract(Section):
             raise ValueError(f"files: {', '.join(outside)} lie outside of the folder")
         if len(self.action_scale) != len(self.support):
             raise ValueError(f"action_scale: {len(self.action_scale)} numbers for {len(self.support)} support joints")
-        for name in ("kp", "kd", "effort", "velocity_limit"):
-            values = getattr(self, name)
-            if min(values, default=0.0) < 0.0:
-                raise ValueError(f"{name}: {min(values)} is negative")
         if not all(low < high for low, high in zip(self.lower, self.upper, strict=True)):
             raise ValueError(f"lower {self.lower} does not lie below upper {self.upper}")
         support, size = len(self.support), sum(math.prod(part.shape) for part in self.state)

@@ -11,7 +11,6 @@ from scipy.spatial import ConvexHull
 from iowbc.arrays import Array
 from iowbc.control.command import COMMAND
 from iowbc.robot import rotations
-from iowbc.robot.description import GRAVITY
 from iowbc.sim.rendering.appearance import Appearance
 from iowbc.sim.rendering.forces import Force, forces
 from iowbc.sim.simulation import Simulation
@@ -56,12 +55,8 @@ class SimulationRecorder:
         self._held = self._world.scene.kind == "lift"
 
     @property
-    def held_weight(self) -> float:
-        """Weight of the object in the hands [N]; 0 without one."""
-        return GRAVITY * self._held_mass
-
-    @property
-    def _held_mass(self) -> float:
+    def held_mass(self) -> float:
+        """Mass of the object in the hands [kg]; 0 without one."""
         return float(self._simulation.drawn["object_mass"][0]) if self._held else 0.0
 
     def look(self, seconds: float) -> Moment:
@@ -83,7 +78,7 @@ class SimulationRecorder:
         centre: Array = state.com_position[0].copy()
         if self._held:
             offset = rotations.rotate(state.object_quaternion[:1], simulation.drawn["object_com_offset"][:1])[0]
-            part = self._held_mass / (self._held_mass + float(self._world.robot_mass[0]))
+            part = self.held_mass / (self.held_mass + float(self._world.robot_mass[0]))
             centre += part * (state.object_position[0] + offset - centre)
         centre[2] = 0.0
         return centre

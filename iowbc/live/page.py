@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Callable, Sequence
-from functools import cached_property
 from typing import Any
 
 import viser
@@ -39,6 +38,7 @@ class Page:
     ) -> None:
         """`panel`: makes the controls that fit the session, with the titles of the evaluated trials."""
         self.server, self.session, self._evaluated = server, session, evaluated
+        self._trials = [] if evaluated is None else trial_titles(evaluated.trials)
         self.panel = panel(server.gui, session, self._trials)
         self.drawing = Drawing(server, session.robot, session.view)
         self.paused = False
@@ -52,10 +52,6 @@ class Page:
         self._due = self._drawn = self._read = self._looked = self._now = 0.0
         self._ended: float | None = None
         self._pace = (0.0, 0.0)
-
-    @cached_property
-    def _trials(self) -> list[str]:
-        return [] if self._evaluated is None else trial_titles(self._evaluated.trials)
 
     def run(self, ready: Callable[[], None]) -> None:
         """Run until interrupted, paused while no browser is connected; `ready` is called once the page is complete."""

@@ -7,7 +7,7 @@ import signal
 import threading
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from multiprocessing.connection import Connection
 from typing import Any
 
@@ -16,7 +16,7 @@ import viser
 from iowbc.arrays import Array
 from iowbc.live.drag import Pushed, spring_pulls
 from iowbc.live.drawing import Drawing, ShownParts
-from iowbc.live.moment import Moment, SimulationRecorder
+from iowbc.live.moment import SimulationRecorder
 from iowbc.live.page import PICTURES
 from iowbc.live.server import serving
 from iowbc.robot.description import Robot
@@ -29,24 +29,9 @@ STARTING = 120.0
 """Time that the page is given to begin before the simulation does [s]."""
 
 
-@dataclass(frozen=True)
-class Asked:
-    """A page's request for a picture, with what its visitor did since the last one."""
-
-    release: bool
-    """The button was pressed."""
-    pulls: dict[Pushed, Array]
-    """Forces of the mouse, world frame, (3,) each [N]."""
-
-
-@dataclass(frozen=True)
-class Picture:
-    """The answer to a request."""
-
-    moment: Moment
-    status: str
-    supported: bool
-    """There is a support to release."""
+Asked = tuple[bool, dict[Pushed, Array]]
+"""A page's request for a picture: whether the button to release the robot was pressed since the last one, and the
+forces of the mouse, world frame, (3,) each [N]."""
 
 
 class RemoteView:
@@ -70,11 +55,12 @@ class RemoteView:
             raise EOFError from error
 
     def answer(self, seconds: float, beside: Sequence[Force], status: str, supported: bool) -> None:
-        """Send the simulation's current state, `seconds` after its start, with additional forces `beside`."""
+        """Send the simulation's current state, `seconds` after its start, with additional forces `beside`; `supported`:
+        there is a support to release."""
         moment = self._recorder.look(seconds)
         shown = replace(moment, forces=(*moment.forces, *beside))
         with contextlib.suppress(BrokenPipeError):  # the page has ended; `asked` will raise
-            self._requests.send(Picture(shown, status, supported))
+            self._requests.send((shown, status, supported))
 
     def close(self) -> None:
         self._requests.close()
@@ -99,9 +85,9 @@ def draw(server: viser.ViserServer, requests: Connection, robot: Robot, model: A
         begin = time.monotonic()
         release = pressed.is_set()
         pressed.clear()
-        requests.send(Asked(release, spring_pulls(drawing.drags.now(drawing.away))))
-        picture: Picture = requests.recv()
+        requests.send((release, spring_pulls(drawing.drags.now(drawing.away))))
+        moment, text, supported = requests.recv()
         with server.atomic():
-            drawing.show(model, picture.moment, ShownParts())
-            status.content, button.visible = picture.status, picture.supported
+            drawing.show(model, moment, ShownParts())
+            status.content, button.visible = text, supported
         time.sleep(max(0.0, begin + PICTURES - time.monotonic()))

@@ -20,7 +20,7 @@ from iowbc.live.drag import Drag
 from iowbc.live.drawing import VIEW, GameMarks
 from iowbc.live.moment import Moment, MomentRecorder
 from iowbc.recipe.evaluation.evaluation import Success
-from iowbc.robot.description import Robot
+from iowbc.robot.description import GRAVITY, Robot
 from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv
 
@@ -155,7 +155,7 @@ def track_of(recorder: MomentRecorder, world: Specification, title: str, kept: i
         model=recorder.model,
         period=recorder.batch.period,
         gait_period=1.0 / world.recipe.task.references.gait.frequency,
-        held_weight=recorder.held_weight,
+        held_weight=GRAVITY * recorder.held_mass,
         joints=recorder.batch.robot.joints,
         moments=deque(maxlen=kept),
     )

@@ -87,7 +87,7 @@ def _configured(domain: int, configuration: str) -> Domain:
 
 
 class DdsBus:
-    """A participant of the bus; see `iowbc.onboard.process.Bus`."""
+    """A participant of the bus; the kind of a message determines its topic."""
 
     def __init__(self, network: str, domain: int = 0) -> None:
         """`network`: interface such as `lo` or `eth0`. Raises UsageError if Cyclone DDS cannot use it."""
@@ -105,16 +105,19 @@ class DdsBus:
         self._writers: dict[Any, DataWriter[Any]] = {}
 
     def publish(self, message: Record) -> None:
+        """Sends a message of any kind."""
         kind = message.dtype
         if kind not in self._writers:
             self._writers[kind] = DataWriter(self._participant, self._topics[kind])
         self._writers[kind].write(_sample(self._types[kind], to_cdr(message)))
 
     def take(self, kind: np.dtype[np.void]) -> list[Record]:
+        """Messages of one kind from others since the last call, oldest first."""
         samples = self._reader(kind)[0].take(KEPT)
         return [from_cdr(kind, sample.data) for sample in samples if isinstance(sample, self._types[kind])]
 
     def wait(self, kind: np.dtype[np.void], seconds: float) -> bool:
+        """Waits for a message; False after the timeout [s]."""
         return bool(self._reader(kind)[1].wait(duration(seconds=seconds)) > 0)
 
     def _reader(self, kind: np.dtype[np.void]) -> tuple[DataReader[Any], WaitSet]:
@@ -129,6 +132,7 @@ class DdsBus:
         return reader, waiting
 
     def high_level_mode(self, seconds: float) -> str | None:
+        """Name of the robot's active built-in controller: "" for none, None without an answer."""
         reader, waiting = self._listening(Topic(self._participant, f"{SWITCHER}response", Response_))
         writer = DataWriter(self._participant, Topic(self._participant, f"{SWITCHER}request", Request_))
         number, end = time.monotonic_ns(), time.monotonic() + seconds

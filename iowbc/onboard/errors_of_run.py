@@ -36,13 +36,18 @@ class LoggedRun:
     velocity: Array
     """Velocity of the pelvis in the heading frame, averaged over a gait period, (T, 2) [m/s]."""
 
+    @property
+    def wanted_heading(self) -> Array:
+        """Heading at the start plus the integrated yaw rate commanded, (T,) [rad]."""
+        period = np.diff(self.time, prepend=self.time[0])
+        wanted: Array = self.heading[0] + np.cumsum(self.command[:, YAW_RATE] * period)
+        return wanted
+
     def deviations(self) -> dict[str, Array]:
         """Deviation from the requested command, by the error's name, (T,) each."""
-        period = np.diff(self.time, prepend=self.time[0])
-        wanted = self.heading[0] + np.cumsum(self.command[:, YAW_RATE] * period)
         return {
             "E_v": np.linalg.norm(self.velocity - self.command[:, :2], axis=1),
-            "E_ψ": np.abs(self.heading - wanted),
+            "E_ψ": np.abs(self.heading - self.wanted_heading),
             "E_α": np.abs(self.pitch - self.command[:, PITCH]),
             "E_h": np.abs(self.height - self.command[:, HEIGHT]),
         }
@@ -68,7 +73,8 @@ def read_run(path: Path, robot: Robot, control_frequency: float, gait_frequency:
         roll, pitch = np.arctan2(-y, -z), np.arctan2(x, np.hypot(y, z))
         upright = rotations.matrix(rotations.from_euler(roll, pitch, np.zeros(())))
         feet = np.stack([upright @ robot.tree.forward(angles, robot.base, sole)[0] for sole in robot.soles])
-        lean = float(rotations.lean_of(upright @ _torso(robot, angles)))
+        torso = robot.tree.pose(angles, robot.base, robot.torso)[1]
+        lean = float(rotations.lean_of(upright @ torso))
         rows.append([given.now - begin, lean, sensors.heading, *wanted.command])
         soles.append(feet)
     if len(rows) < 2:
@@ -82,16 +88,6 @@ def read_run(path: Path, robot: Robot, control_frequency: float, gait_frequency:
         heading=table[:, 2],
         velocity=_averaged(_velocity(feet, table[:, 0], table[:, 2]), round(control_frequency / gait_frequency)),
     )
-
-
-def _torso(robot: Robot, angles: dict[str, float]) -> Array:
-    """Rotation of the torso in the base, (3, 3)."""
-    rotation = np.eye(3)
-    for body in robot.tree.chain(robot.torso, robot.base):
-        rotation = rotation @ rotations.matrix(body.quaternion)
-        if body.hinge is not None:
-            rotation = rotation @ rotations.axis_matrix(body.hinge.axis, np.asarray(angles[body.hinge.name]))
-    return rotation
 
 
 def _velocity(feet: Array, time: Array, heading: Array) -> Array:

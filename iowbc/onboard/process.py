@@ -6,12 +6,12 @@ import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 
 from iowbc.onboard import messages
 from iowbc.onboard.checks import BusSnapshot
+from iowbc.onboard.dds import DdsBus
 from iowbc.onboard.log import LogWriter
 from iowbc.onboard.machine import FREQUENCY, CycleInputs, Machine, State
 from iowbc.onboard.messages import Record
@@ -30,43 +30,16 @@ KEPT_TIMES = 1 << 20
 """Number of latest cycles kept for the timing statistics: 35 minutes."""
 
 
-class Bus(Protocol):
-    """Publishes messages and receives those of other participants; the kind of message determines the topic."""
-
-    def publish(self, message: Record) -> None:
-        """Sends a message of any kind."""
-
-    def take(self, kind: np.dtype[np.void]) -> list[Record]:
-        """Messages of one kind from others since the last call, oldest first."""
-
-    def wait(self, kind: np.dtype[np.void], seconds: float) -> bool:
-        """Waits for a message; False after the timeout [s]."""
-
-    def high_level_mode(self, seconds: float) -> str | None:
-        """Name of the robot's active built-in controller: "" for none, None without an answer."""
-
-    def close(self) -> None:
-        """Leaves the bus."""
-
-
-class Clock(Protocol):
-    """Timing of the loop's cycles."""
-
-    late: float
-    """Delay of the last cycle's start [s]."""
-
-    def turn(self, bus: Bus) -> tuple[float, tuple[Record, ...]]:
-        """Waits for the next cycle; returns its time [s] and the states that have arrived."""
-
-
 class MonotonicClock:
     """Periodic cycles on this machine's monotonic clock; missed ones are skipped."""
 
     def __init__(self) -> None:
         self._due = time.monotonic()
         self.late = 0.0
+        """Delay of the last cycle's start [s]."""
 
-    def turn(self, bus: Bus) -> tuple[float, tuple[Record, ...]]:
+    def turn(self, bus: DdsBus) -> tuple[float, tuple[Record, ...]]:
+        """Waits for the next cycle; returns its time [s] and the states that have arrived."""
         self._due += PERIOD
         now = time.monotonic()
         if now < self._due:
@@ -85,11 +58,14 @@ class LockStep:
     def __init__(self) -> None:
         self._now = 0.0
 
-    def turn(self, bus: Bus) -> tuple[float, tuple[Record, ...]]:
+    def turn(self, bus: DdsBus) -> tuple[float, tuple[Record, ...]]:
         arrived = bus.wait(messages.LOW_STATE, PATIENCE)
         states = tuple(bus.take(messages.LOW_STATE))
         self._now = 1e-3 * float(states[-1]["tick"]) if arrived and states else self._now + PATIENCE
         return self._now, states
+
+
+Clock = MonotonicClock | LockStep
 
 
 @dataclass(frozen=True)
@@ -112,7 +88,7 @@ class Times:
         return "; ".join([f"{len(self.late)} turns", *parts])
 
 
-def listen(bus: Bus, seconds: float) -> BusSnapshot:
+def listen(bus: DdsBus, seconds: float) -> BusSnapshot:
     """Receives messages for some time [s] from the first state on."""
     states: list[Record] = []
     battery: Record | None = None
@@ -143,7 +119,7 @@ def enable_realtime() -> str:
 
 
 def drive(
-    bus: Bus,
+    bus: DdsBus,
     machine: Machine,
     operator: Operator,
     clock: Clock,

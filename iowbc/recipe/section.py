@@ -50,6 +50,7 @@ Masses = Annotated[tuple[Annotated[float, Field(ge=0)], ...], AfterValidator(_as
 """Masses [kg] that ascend without repetition."""
 Positive = Annotated[float, Field(gt=0)]
 NonNegative = Annotated[float, Field(ge=0)]
+NonNegativeRange = Annotated[tuple[NonNegative, NonNegative], AfterValidator(in_order)]
 Width = Annotated[int, Field(gt=0, le=16_384)]
 """Units of a hidden layer."""
 ArtifactName = Annotated[str, Field(pattern=r"^([0-9a-f]{8,64}|.+\.ya?ml)$", max_length=300)]

@@ -125,15 +125,20 @@ class Tree:
 
     def forward(self, joint_position: dict[str, float], start: str, site: str) -> tuple[Array, Array]:
         """Position (3,) and rotation (3, 3) of a site in the frame of body `start`."""
-        position, rotation = np.zeros(3), np.eye(3)
         end = self.body_of_site(site)
-        for body in self.chain(end.name, start):
+        position, rotation = self.pose(joint_position, start, end.name)
+        return position + rotation @ end.sites[site], rotation
+
+    def pose(self, joint_position: dict[str, float], start: str, end: str) -> tuple[Array, Array]:
+        """Position (3,) and rotation (3, 3) of body `end` in the frame of body `start`."""
+        position, rotation = np.zeros(3), np.eye(3)
+        for body in self.chain(end, start):
             position = position + rotation @ body.position
             rotation = rotation @ rotations.matrix(body.quaternion)
             if body.hinge is not None:
                 angle = np.asarray(joint_position[body.hinge.name])
                 rotation = rotation @ rotations.axis_matrix(body.hinge.axis, angle)
-        return position + rotation @ end.sites[site], rotation
+        return position, rotation
 
 
 def small_text(path: Path) -> str:

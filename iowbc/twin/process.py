@@ -4,7 +4,8 @@ import time
 from collections.abc import Callable
 
 from iowbc.onboard import messages
-from iowbc.onboard.process import PATIENCE, PERIOD, Bus
+from iowbc.onboard.dds import DdsBus
+from iowbc.onboard.process import PATIENCE, PERIOD
 from iowbc.twin.robot import Twin
 
 BATTERY_PERIODS = 250
@@ -12,7 +13,7 @@ BATTERY_PERIODS = 250
 
 
 def serve(
-    bus: Bus,
+    bus: DdsBus,
     twin: Twin,
     going: Callable[[], bool],
     *,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from sagittal_plane import measured
 
-from iowbc.control.foothold import FootPlacement
+from iowbc.control.feedback import FootPlacement
 from iowbc.control.sensors import Measured
 from iowbc.control.stride import Stride
 from iowbc.recipe.task.joint_references import GaitPrior, Placement
@@ -19,16 +19,13 @@ PERIOD = 0.02
 
 @pytest.fixture(scope="module")
 def placement(robot: Robot) -> FootPlacement:
-    made = FootPlacement.of(robot, PRIOR)
-    assert made is not None
-    return made
+    return FootPlacement(robot, PRIOR, FEEDBACK)
 
 
 def moving(robot: Robot, speed: float) -> Measured:
     """A robot in its default posture that turns over its feet at such a speed."""
     position = robot.default_position
-    unit = FootPlacement.of(robot, PRIOR)
-    assert unit is not None
+    unit = FootPlacement(robot, PRIOR, FEEDBACK)
     still = np.zeros(len(position))
     per_rate = unit.odometry.speed(measured(position, still, 0.0, 1.0)).mean()
     return measured(position, still, 0.0, speed / per_rate)
@@ -63,8 +60,7 @@ def test_a_foot_on_the_ground_comes_back_and_no_step_is_longer_than_allowed(
 
 def test_both_feet_trail_by_the_way_that_the_robot_stays_behind_and_come_back_where_it_stands(robot: Robot) -> None:
     settings = FEEDBACK.model_copy(update={"integral": 0.1, "longest_trim": 0.05})
-    placement = FootPlacement.of(robot, GaitPrior(placement=settings))
-    assert placement is not None
+    placement = FootPlacement(robot, PRIOR, settings)
     command, ones, trims = np.zeros((1, 11)), np.ones(1), []
     command[:, 0] = 0.4
     foothold = np.zeros((1, 3))
@@ -79,8 +75,7 @@ def test_both_feet_trail_by_the_way_that_the_robot_stays_behind_and_come_back_wh
 
 
 def test_the_stride_moves_each_foot_by_its_own_way_and_by_that_of_both(robot: Robot) -> None:
-    stride = Stride.of(robot, GaitPrior(placement=FEEDBACK))
-    assert stride is not None
+    stride = Stride(robot, GaitPrior(placement=FEEDBACK))
     posture, zero, one = robot.default_position[robot.support][None], np.zeros(1), np.ones(1)
     command = np.zeros((1, 11))
 
@@ -89,7 +84,3 @@ def test_the_stride_moves_each_foot_by_its_own_way_and_by_that_of_both(robot: Ro
 
     np.testing.assert_allclose(moved(0.01, -0.02, -0.03, 0.0), moved(-0.02, -0.05, 0.0, 0.0), atol=1e-12)
     assert np.abs(moved(0.0, 0.0, -0.03, 0.0) - moved(0.0, 0.0, 0.0, 0.0)).max() > 0.01
-
-
-def test_without_the_setting_there_is_none(robot: Robot) -> None:
-    assert FootPlacement.of(robot, GaitPrior()) is None

@@ -5,7 +5,7 @@ import pytest
 from sagittal_plane import measured, sole
 
 from iowbc.control.command import HEIGHT
-from iowbc.control.height import LegStretch
+from iowbc.control.feedback import LegStretch
 from iowbc.control.stride import Stride
 from iowbc.recipe.task.joint_references import GaitPrior, HeightFeedback
 from iowbc.robot.description import Robot
@@ -14,8 +14,7 @@ PERIOD = 0.02
 
 
 def test_the_legs_stretch_by_the_integral_of_what_the_pelvis_hangs_lower_than_commanded(robot: Robot) -> None:
-    feedback = LegStretch.of(robot, HeightFeedback(integral=0.5, furthest=0.03))
-    assert feedback is not None
+    feedback = LegStretch(robot, HeightFeedback(integral=0.5, furthest=0.03))
     standing = measured(robot.default_position, np.zeros(len(robot.joints)), 0.0, 0.0)
     command, stretch = np.zeros((1, 11)), np.zeros((1, 1))
     command[:, HEIGHT] = feedback.odometry.height(standing).max() + 0.01
@@ -32,8 +31,7 @@ def test_the_legs_stretch_by_the_integral_of_what_the_pelvis_hangs_lower_than_co
 def test_stretched_legs_put_both_feet_lower_under_the_pelvis_standing_and_walking(
     robot: Robot, stepping: float
 ) -> None:
-    stride = Stride.of(robot, GaitPrior(sway=0.0), held=True)
-    assert stride is not None
+    stride = Stride(robot, GaitPrior(sway=0.0), held=True)
     posture, zero, command = robot.default_position[robot.support][None], np.zeros(1), np.zeros((1, 11))
     places = []
     for stretch in (0.0, 0.02):
@@ -45,10 +43,8 @@ def test_stretched_legs_put_both_feet_lower_under_the_pelvis_standing_and_walkin
     np.testing.assert_allclose(moved, np.broadcast_to([0.0, -0.02], (2, 2)), atol=1e-4)
 
 
-def test_without_the_setting_there_is_none_and_a_standing_robot_keeps_its_posture(robot: Robot) -> None:
-    assert LegStretch.of(robot, None) is None
-    stride = Stride.of(robot, GaitPrior())
-    assert stride is not None
+def test_without_the_setting_a_standing_robot_keeps_its_posture(robot: Robot) -> None:
+    stride = Stride(robot, GaitPrior())
     posture, zero = robot.default_position[robot.support][None], np.zeros(1)
     kept = stride(posture, zero, np.zeros((1, 11)), zero, zero, np.array([[0.0, 0.0, 0.05, 0.02]]))
     np.testing.assert_array_equal(kept, posture)

@@ -5,7 +5,7 @@ import pytest
 from sagittal_plane import measured
 
 from iowbc.control.command import PITCH
-from iowbc.control.hips import HipFeedback
+from iowbc.control.feedback import HipFeedback
 from iowbc.control.legs import leg_joints
 from iowbc.control.sensors import Measured
 from iowbc.recipe.task.joint_references import TorsoFeedback
@@ -17,9 +17,7 @@ PERIOD = 0.02
 
 @pytest.fixture(scope="module")
 def feedback(robot: Robot) -> HipFeedback:
-    made = HipFeedback.of(robot, SETTINGS)
-    assert made is not None
-    return made
+    return HipFeedback(robot, SETTINGS)
 
 
 def leaning(robot: Robot, pelvis: float, waist: float) -> Measured:
@@ -55,7 +53,3 @@ def test_legs_that_keep_their_place_turn_the_pelvis_back(robot: Robot, feedback:
         angles[robot.joints[robot.support[leg[0]]]] += 0.1
         after, _ = robot.tree.forward(angles, robot.base, robot.soles[side])
         assert after[0] < before[0], "the foot goes back under the pelvis, or the pelvis leans back over it"
-
-
-def test_without_the_setting_there_is_none(robot: Robot) -> None:
-    assert HipFeedback.of(robot, None) is None

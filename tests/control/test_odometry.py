@@ -31,7 +31,7 @@ def test_speed_and_height_are_those_of_a_base_over_feet_at_rest(robot: Robot, se
     random = np.random.default_rng(seed)
     position, velocity = sagittal(robot, random)
     pitch, rate = random.uniform(-0.3, 0.5), random.uniform(-1.0, 1.0)
-    odometry, felt = LegOdometry.of(robot), measured(position, velocity, pitch, rate)
+    odometry, felt = LegOdometry(robot), measured(position, velocity, pitch, rate)
     for side in range(2):
         ends = [sole(robot, position + way * velocity, pitch + way * rate, side)[0] for way in (-STEP, STEP)]
         assert odometry.speed(felt)[0, side] == pytest.approx(-(ends[1] - ends[0]) / (2.0 * STEP), abs=0.01)

@@ -12,7 +12,7 @@ import pytest
 import viser
 
 from iowbc.live.moment import SimulationRecorder
-from iowbc.live.remote_view import Asked, Picture, RemoteView, draw
+from iowbc.live.remote_view import RemoteView, draw
 from iowbc.live.server import LocalServer, serving
 from iowbc.live.session import Session
 from iowbc.sim.rendering.forces import Force
@@ -40,10 +40,10 @@ def test_a_page_draws_what_it_is_sent_and_asks_for_more(
     page: tuple[LocalServer, Connection, SimulationRecorder],
 ) -> None:
     server, requests, recorder = page
-    asked: Asked = requests.recv()
-    assert not asked.release
+    released, _ = requests.recv()
+    assert not released
     moment = recorder.look(1.0)
-    requests.send(Picture(moment, "held by band", True))
+    requests.send((moment, "held by band", True))
     requests.recv()
     frame = server.scene._handle_from_node_name["/world/bodies/pelvis"]
     assert frame.position == pytest.approx(moment.bodies[recorder.model.body("pelvis").id, :3], abs=1e-6)
@@ -52,11 +52,11 @@ def test_a_page_draws_what_it_is_sent_and_asks_for_more(
     )
     for call in button._impl.update_cb:
         call(None)
-    requests.send(Picture(moment, "held by band", False))
-    assert requests.recv().release
+    requests.send((moment, "held by band", False))
+    assert requests.recv()[0]
     assert not button.visible
-    requests.send(Picture(moment, "", False))
-    assert not requests.recv().release
+    requests.send((moment, "", False))
+    assert not requests.recv()[0]
 
 
 @pytest.mark.integration
@@ -68,7 +68,7 @@ def test_the_process_of_a_page_asks_for_pictures_and_ends_with_the_simulation(se
     for _ in range(3):
         while (asked := view.asked()) is None:
             time.sleep(0.002)
-        assert asked.pulls["robot"] == pytest.approx(np.zeros(3))
+        assert asked[1]["robot"] == pytest.approx(np.zeros(3))
         view.answer(1.0, (Force("band", np.ones(3), np.full(3, 100.0)),), "", True)
     view.close()
     child.wait(60)

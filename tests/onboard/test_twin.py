@@ -139,7 +139,7 @@ class View:
         self.answers: list[tuple[float, str, bool]] = []
 
     def asked(self) -> Asked:
-        return Asked(True, {"robot": np.array([0.0, 30.0, 0.0]), "object": np.ones(3)})
+        return True, {"robot": np.array([0.0, 30.0, 0.0]), "object": np.ones(3)}
 
     def answer(self, seconds: float, beside: Sequence[Force], status: str, supported: bool) -> None:
         assert [force.kind for force in beside] == ["band"]

@@ -20,8 +20,8 @@ def test_a_recipe_may_have_transport_tasks_of_its_own() -> None:
     ("change", "told"),
     [
         ({"scene": "lifft"}, "no scene 'lifft' with an object"),
-        ({"mass": [12.0, 10.0]}, "expected 0 <= low <= high"),
-        ({"share": [0.5, 1.5]}, "nobody bears more than all of it"),
+        ({"mass": [12.0, 10.0]}, "lower end 12 is above the upper end 10"),
+        ({"share": [0.5, 1.5]}, "less than or equal to 1"),
         ({"path": []}, "at least 1 item"),
     ],
 )

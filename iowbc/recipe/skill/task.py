@@ -1,14 +1,14 @@
 """Transport tasks: an object, its load, and the path of its centre between walls."""
 
 import math
-from collections.abc import Iterator
+from typing import Annotated
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
-from iowbc.recipe.section import NamedEntries, Section
+from iowbc.recipe.section import NamedEntries, NonNegativeRange, Section, in_order
 from iowbc.recipe.simulation.holding import ObjectScene
 
-Range = tuple[float, float]
+Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
 class Stretch(Section):
@@ -31,9 +31,9 @@ class TransportTask(Section):
     """Scene of the task, with an object."""
     path: tuple[Stretch, ...] = Field(min_length=1, max_length=64)
     """Segments in order, from the object's centre at the start, along the robot's heading."""
-    mass: Range
+    mass: NonNegativeRange
     """Range of the object's mass [kg]; too heavy for the robot alone."""
-    share: Range = (0.4, 0.6)
+    share: Annotated[tuple[Share, Share], AfterValidator(in_order)] = (0.4, 0.6)
     """Range of the human's share of the weight, or in a push of the rolling resistance."""
     rolling_resistance: float | None = Field(default=None, ge=0.0)
     """Rolling resistance as a fraction of the weight, in a push; empty: drawn as in training."""
@@ -41,13 +41,6 @@ class TransportTask(Section):
     """Time limit [s]."""
     weight: float = Field(default=1.0, ge=0.0)
     """Frequency of the task among those of the same scene; only the proportions matter."""
-
-    def problems(self) -> Iterator[tuple[str, str]]:
-        for name, (low, high) in (("mass", self.mass), ("share", self.share)):
-            if not 0.0 <= low <= high:
-                yield "", f"{name}: expected 0 <= low <= high, got {low:g} and {high:g}"
-        if self.share[1] > 1.0:
-            yield "", f"share: nobody bears more than all of it, got {self.share[1]:g}"
 
 
 STRAIGHT = (Stretch(length=3.0),)

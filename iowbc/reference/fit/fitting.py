@@ -1,7 +1,6 @@
 """Fit of the reference network in torch: joint errors, and their first-order effect on feet, height and torso."""
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -45,17 +44,6 @@ class Fitted:
     validation_loss: tuple[float, ...]
 
 
-@contextmanager
-def _one_thread() -> Iterator[None]:
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(threads)
-
-
-@_one_thread()
 def fit(
     train: FitData,
     validation: FitData,
@@ -68,6 +56,7 @@ def fit(
 
     One thread and one seeded generator: the result is the same on every run.
     """
+    torch.set_num_threads(1)
     generator = torch.Generator().manual_seed(seed)
     input_mean, input_std = _moments(train.inputs)
     output_mean, output_std = _moments(train.outputs)

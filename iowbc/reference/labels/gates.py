@@ -1,6 +1,5 @@
 """Physical gates of a label, checked on the whole robot and independent of the labelling method."""
 
-from dataclasses import dataclass
 from itertools import combinations
 from typing import Any, Literal
 
@@ -16,18 +15,6 @@ from iowbc.reference.labels.soles import sole_limits, support_edges, support_mar
 from iowbc.reference.labels.support_model import SupportModel, ground_forces
 from iowbc.robot.description import Robot
 from iowbc.robot.mjcf import Capsule
-
-
-@dataclass(frozen=True)
-class LabelMeasurements:
-    """Findings of the gates about a label."""
-
-    torque: Array
-    """Torques of the support joints in equilibrium, shape (15,) [N·m]."""
-    margin: float
-    """Distance of the projected centre of mass inside the support polygon [m]."""
-    height: float
-    """Height reached [m]."""
 
 
 class LabelChecker:
@@ -51,8 +38,9 @@ class LabelChecker:
         if self.collision.clearance(support.full_data)[0] < self.gates.collision_clearance:
             raise Rejected("arms collide")
 
-    def label(self, sample: Sample, posture: Posture) -> LabelMeasurements:
-        """Passes a label or raises `Rejected`. The support model must be locked to the sample."""
+    def label(self, sample: Sample, posture: Posture) -> dict[str, Array]:
+        """Torque, margin and height reached of a label, named as in the dataset, or raises `Rejected`. The support
+        model must be locked to the sample."""
         support, gates, robot = self.support, self.gates, self.support.robot
         model, data = support.full, support.full_data
         q = support.whole(posture.configuration, sample.arm)
@@ -83,7 +71,7 @@ class LabelChecker:
         for reason, found in failed.items():
             if found:
                 raise Rejected(reason)
-        return LabelMeasurements(torque[6 + robot.support], margin, height)
+        return {"torque": torque[6 + robot.support], "margin": np.asarray(margin), "reached": np.asarray(height)}
 
 
 class SelfCollision:

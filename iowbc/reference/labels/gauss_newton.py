@@ -88,28 +88,22 @@ def cost_weights(support: SupportModel) -> tuple[Array, Array]:
     return np.sqrt(task), np.sqrt(posture_weights(support.robot, problem))
 
 
-class KinematicStart:
-    """Feet in place, centre of mass over their middle, height and torso as commanded, near the default posture."""
+def kinematic_start(support: SupportModel, height: Literal["pelvis", "com"], sample: Sample) -> Array:
+    """Configuration (22,) with the feet in place, the centre of mass over their middle, height and torso as commanded,
+    near the default posture. The support model must be locked to the sample.
 
-    def __init__(self, support: SupportModel, height: Literal["pelvis", "com"]) -> None:
-        self.support, self.height = support, height
-        self.weight = np.concatenate(cost_weights(support))
-
-    def posture(self, sample: Sample) -> Array:
-        """Configuration (22,) of the support model, which must be locked to the sample.
-
-        Gauss-Newton steps on the cost without torques, with the feet as linearised equalities and the joint ranges.
-        Raises `Rejected` where the feet cannot stay in place.
-        """
-        support, problem = self.support, self.support.problem
-        q, largest = support.rest(sample), problem.largest_step
-        rest = q[7:].copy()
-        for _ in range(problem.iterations):
-            cost = PostureCost.at(support, self.height, q, sample, rest)
-            gradient, residual = self.weight[:, None] * cost.gradient, self.weight * cost.residual
-            lower, upper = np.maximum(support.lower - q[7:], -largest), np.minimum(support.upper - q[7:], largest)
-            step = constrained_step(gradient, residual, cost.equality, cost.error, cost.gradient[6:], lower, upper)
-            q = pinocchio.integrate(support.model, q, step)
-            if np.abs(step).max() < problem.tolerance:
-                break
-        return q
+    Gauss-Newton steps on the cost without torques, with the feet as linearised equalities and the joint ranges. Raises
+    `Rejected` where the feet cannot stay in place.
+    """
+    problem, weight = support.problem, np.concatenate(cost_weights(support))
+    q, largest = support.rest(sample), problem.largest_step
+    rest = q[7:].copy()
+    for _ in range(problem.iterations):
+        cost = PostureCost.at(support, height, q, sample, rest)
+        gradient, residual = weight[:, None] * cost.gradient, weight * cost.residual
+        lower, upper = np.maximum(support.lower - q[7:], -largest), np.minimum(support.upper - q[7:], largest)
+        step = constrained_step(gradient, residual, cost.equality, cost.error, cost.gradient[6:], lower, upper)
+        q = pinocchio.integrate(support.model, q, step)
+        if np.abs(step).max() < problem.tolerance:
+            break
+    return q

@@ -2,11 +2,11 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, Protocol
+from typing import Literal
 
 import numpy as np
 
-from iowbc.arrays import Array, Indices
+from iowbc.arrays import Array
 from iowbc.recipe.generator import ReferenceGenerator
 from iowbc.reference.labels.gates import LabelChecker
 from iowbc.reference.labels.plan import SamplePlan
@@ -14,16 +14,6 @@ from iowbc.reference.labels.sample import Sample
 from iowbc.reference.labels.static import StaticMethod
 from iowbc.reference.labels.support_model import SupportModel
 from iowbc.robot.description import load_robot
-
-
-class Solver(Protocol):
-    """Draws samples and labels them one at a time, in a worker process."""
-
-    def draw(self, indices: Indices) -> list[Sample]:
-        """The samples of these numbers."""
-
-    def solve(self, index: int, sample: Sample) -> dict[str, Array]:
-        """Arrays of one label, the same shapes for every sample. Raises `Rejected` with a reason."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +31,7 @@ class LabelTask:
 
 
 class Labeller:
-    """Draws, solves and checks samples."""
+    """Draws samples by their numbers, and solves and checks them one at a time."""
 
     def __init__(self, task: LabelTask) -> None:
         robot, recipe = load_robot(task.robot), task.recipe
@@ -59,13 +49,10 @@ class Labeller:
         """A label that passed every gate, as arrays named as in the dataset. Raises `Rejected`."""
         self.judge.arms(sample)
         posture = self.method.solve(sample)
-        evidence = self.judge.label(sample, posture)
         return {
             "support": posture.support,
             "base_position": posture.configuration[:3],
             "base_quaternion": np.roll(posture.configuration[3:7], 1),
             "wrench": posture.wrench,
-            "torque": evidence.torque,
-            "margin": np.asarray(evidence.margin),
-            "reached": np.asarray(evidence.height),
+            **self.judge.label(sample, posture),
         }

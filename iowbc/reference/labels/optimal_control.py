@@ -14,7 +14,7 @@ import pinocchio
 from iowbc.arrays import Array
 from iowbc.errors import Rejected
 from iowbc.recipe.generator import ReferenceGenerator
-from iowbc.reference.labels.gauss_newton import UNBOUNDED, KinematicStart, constrained_step
+from iowbc.reference.labels.gauss_newton import UNBOUNDED, constrained_step, kinematic_start
 from iowbc.reference.labels.sample import Posture, Sample
 from iowbc.reference.labels.soles import SoleLimits, sole_limits
 from iowbc.reference.labels.support_model import SupportModel, posture_weights
@@ -34,7 +34,6 @@ class OptimalControlMethod:
         self.actuation = crocoddyl.ActuationModelFloatingBase(self.state)
         if self.actuation.nu != len(support.robot.support):
             raise ValueError(f"crocoddyl sees {self.actuation.nu} actuated joints, not {len(support.robot.support)}")
-        self.kinematic = KinematicStart(support, recipe.height)
         self.posture = posture_weights(support.robot, recipe.problem)
         self.limits = sole_limits(support.robot, recipe.problem)
 
@@ -51,7 +50,9 @@ class OptimalControlMethod:
 
     def trajectory(self, sample: Sample) -> list[Array]:
         """States (configuration, velocity) at the nodes. The support model must be locked to the sample."""
-        start = np.concatenate([self.kinematic.posture(sample), np.zeros(self.support.model.nv)])
+        start = np.concatenate(
+            [kinematic_start(self.support, self.recipe.height, sample), np.zeros(self.support.model.nv)]
+        )
         contacts = self._contacts()
         running = self._action(self._costs(sample, terminal=False), contacts, self.ocp.step)
         terminal = self._action(self._costs(sample, terminal=True), contacts, 0.0)
@@ -82,15 +83,19 @@ class OptimalControlMethod:
 
     def _costs(self, sample: Sample, *, terminal: bool) -> Any:
         """The running cost, or the terminal one: no torques or contact forces, velocities held to rest."""
-        state, nu, problem, support = self.state, self.actuation.nu, self.problem, self.support
+        state, nu, nv = self.state, self.actuation.nu, self.support.model.nv
+        problem, support, limits = self.problem, self.support, self.limits
         factor = self.ocp.terminal_factor if terminal else 1.0
         velocity = self.ocp.terminal_velocity_weight / factor if terminal else self.ocp.velocity_weight
         costs = crocoddyl.CostModelSum(state, nu)
-        rest = np.concatenate([support.rest(sample), np.zeros(support.model.nv)])
 
         def add(name: str, residual: Any, weights: Array) -> None:
             activation = crocoddyl.ActivationModelWeightedQuad(weights)
             costs.addCost(name, crocoddyl.CostModelResidual(state, activation, residual), factor)
+
+        def limit(name: str, residual: Any, lower: Array, upper: Array, weight: float) -> None:
+            barrier = crocoddyl.ActivationModelQuadraticBarrier(crocoddyl.ActivationBounds(lower, upper))
+            costs.addCost(name, crocoddyl.CostModelResidual(state, barrier, residual), weight)
 
         of_com = self.recipe.height == "com"
         com_height, base_height = (problem.height_weight, 0.0) if of_com else (0.0, problem.height_weight)
@@ -101,35 +106,21 @@ class OptimalControlMethod:
         add("base height", lift, np.array([0.0, 0.0, base_height]))
         turn = crocoddyl.ResidualModelFrameRotation(state, support.torso, sample.torso_rotation(), nu)
         add("torso", turn, np.full(3, problem.torso_weight))
-        weights = np.concatenate([np.zeros(6), self.posture, np.full(support.model.nv, velocity)])
-        add("posture", crocoddyl.ResidualModelState(state, rest, nu), weights)
-        self._add_limits(costs, rest, factor)
-        if not terminal:
-            add("torque", crocoddyl.ResidualModelControl(state, nu), np.full(nu, problem.torque_weight))
-            self._add_cones(costs)
-        return costs
-
-    def _add_limits(self, costs: Any, rest: Array, factor: float) -> None:
-        support, nv = self.support, self.support.model.nv
-        free = np.full(nv, np.inf)
-        angle = rest[7 : support.model.nq]
+        rest, free = np.concatenate([support.rest(sample), np.zeros(nv)]), np.full(nv, np.inf)
+        deviation, angle = crocoddyl.ResidualModelState(state, rest, nu), rest[7 : support.model.nq]
+        add("posture", deviation, np.concatenate([np.zeros(6), self.posture, np.full(nv, velocity)]))
         lower = np.concatenate([-free[:6], support.lower - angle, -free])
         upper = np.concatenate([free[:6], support.upper - angle, free])
-        barrier = crocoddyl.ActivationModelQuadraticBarrier(crocoddyl.ActivationBounds(lower, upper))
-        residual = crocoddyl.ResidualModelState(self.state, rest, self.actuation.nu)
-        cost = crocoddyl.CostModelResidual(self.state, barrier, residual)
-        costs.addCost("joint limits", cost, factor * self.ocp.limit_weight)
-
-    def _add_cones(self, costs: Any) -> None:
-        limits = self.limits
+        limit("joint limits", deviation, lower, upper, factor * self.ocp.limit_weight)
+        if terminal:
+            return costs
+        add("torque", crocoddyl.ResidualModelControl(state, nu), np.full(nu, problem.torque_weight))
         size = 2.0 * np.array([limits.half_length, limits.half_width])
         cone = crocoddyl.WrenchCone(np.eye(3), limits.friction, size, FACETS, True, limits.smallest_load, np.inf)
-        bounds = crocoddyl.ActivationBounds(cone.lb, cone.ub)
-        for sole in self.support.soles:
-            residual = crocoddyl.ResidualModelContactWrenchCone(self.state, sole, cone, self.actuation.nu)
-            activation = crocoddyl.ActivationModelQuadraticBarrier(bounds)
-            cost = crocoddyl.CostModelResidual(self.state, activation, residual)
-            costs.addCost(f"wrench of sole {sole}", cost, self.ocp.cone_weight)
+        for sole in support.soles:
+            wrench = crocoddyl.ResidualModelContactWrenchCone(state, sole, cone, nu)
+            limit(f"wrench of sole {sole}", wrench, cone.lb, cone.ub, self.ocp.cone_weight)
+        return costs
 
 
 def distribute(support: SupportModel, configuration: Array, limits: SoleLimits) -> Array:

@@ -49,25 +49,20 @@ class SamplePlan:
 
     def draw(self, indices: Indices) -> list[Sample]:
         """The samples of these numbers; each depends on its own number only."""
-        found: dict[int, Sample] = {}
-        wanted = np.array([self.group(int(index)) for index in indices], dtype=np.int64)
-        sources = np.unique(wanted[wanted < self.original])
-        if len(sources):
-            unit = self.unit[sources]
-            command = self._commands(unit)
-            drawn = map(Sample, self._arms(unit, command), command)
-            found = dict(zip(sources.tolist(), drawn, strict=True))
-        return [self._one(int(index), int(source), found) for index, source in zip(indices, wanted, strict=True)]
-
-    def _one(self, index: int, source: int, originals: dict[int, Sample]) -> Sample:
-        if index >= self.drawn:
-            arms, row, column = np.unravel_index(index - self.drawn, self.grid_shape)
-            command = np.array([self.heights[column], self.pitches[row]])
-            return Sample(self.grid_arms[arms, row], command)
-        sample = originals[source]
-        if index < self.original:
-            return sample
-        return Sample(self.mirror(sample.arm), sample.command)
+        sources = np.unique([source for index in indices.tolist() if (source := self.group(index)) < self.original])
+        unit = self.unit[sources.astype(np.int64)]
+        commands = self._commands(unit)
+        originals = dict(zip(sources.tolist(), map(Sample, self._arms(unit, commands), commands), strict=True))
+        samples = []
+        for index in indices.tolist():
+            if index >= self.drawn:
+                arms, row, column = np.unravel_index(index - self.drawn, self.grid_shape)
+                command = np.array([self.heights[column], self.pitches[row]])
+                samples.append(Sample(self.grid_arms[arms, row], command))
+                continue
+            sample = originals[self.group(index)]
+            samples.append(sample if index < self.original else Sample(self.mirror(sample.arm), sample.command))
+        return samples
 
     def _carrying(self) -> Array:
         """Arms that keep the wrists at their default place in the heading frame, one posture a pitch, (pitches, 14)."""

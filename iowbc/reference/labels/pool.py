@@ -15,13 +15,13 @@ from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from iowbc.errors import Interrupted, Rejected, WorkerFailed
 from iowbc.processes import die_with_parent, single_threaded
-from iowbc.reference.labels.labelling import Solver
+from iowbc.reference.labels.labelling import Labeller, LabelTask
 from iowbc.reference.labels.shards import Shard, cut, merge, read_shard, write_shard
 
 CRASHED = "solver crashed"
@@ -34,13 +34,6 @@ POLL = 0.2
 STARTS_WITHOUT_WORK = 3
 """Number of workers that die before their first sample at which labelling fails."""
 IDLE = -1
-
-
-class SolverTask(Protocol):
-    """Picklable specification of a solver."""
-
-    def prepare(self) -> Solver:
-        """The solver; called once in each worker."""
 
 
 @dataclass
@@ -63,7 +56,7 @@ class _Queue:
 
 
 def label_all(
-    task: SolverTask,
+    task: LabelTask,
     indices: Sequence[int],
     *,
     folder: Path,
@@ -89,7 +82,10 @@ def label_all(
             if interrupted():
                 raise Interrupted("finished shards are kept")
             for worker in team:
-                _assign(worker, queue, chunks, paths)
+                if worker.chunk is None and queue.waiting:
+                    worker.chunk = chunk = queue.waiting.pop(0)
+                    with suppress(BrokenPipeError, ConnectionResetError):  # _receive reports a dead worker
+                        worker.connection.send((chunk, chunks[chunk], queue.crashed.get(chunk, []), paths[chunk]))
             ready = wait([worker.connection for worker in team], timeout=POLL)
             for worker in [worker for worker in team if worker.connection in ready]:
                 number = _receive(worker)
@@ -112,7 +108,7 @@ def label_all(
     return merge([done[number] for number in range(len(chunks))])
 
 
-def _start_worker(task: SolverTask, key: str) -> _Worker:
+def _start_worker(task: LabelTask, key: str) -> _Worker:
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
     current = context.Value("q", IDLE, lock=False)
@@ -122,15 +118,6 @@ def _start_worker(task: SolverTask, key: str) -> _Worker:
         process.start()
     theirs.close()
     return _Worker(process, ours, current)
-
-
-def _assign(worker: _Worker, queue: _Queue, chunks: Sequence[Sequence[int]], paths: Sequence[Path]) -> None:
-    if worker.chunk is not None or not queue.waiting:
-        return
-    worker.chunk = queue.waiting.pop(0)
-    job = (worker.chunk, chunks[worker.chunk], queue.crashed.get(worker.chunk, []), paths[worker.chunk])
-    with suppress(BrokenPipeError, ConnectionResetError):  # _receive reports a dead worker
-        worker.connection.send(job)
 
 
 def _receive(worker: _Worker) -> int | None:
@@ -170,7 +157,7 @@ def _on_death(worker: _Worker, queue: _Queue) -> None:
         queue.waiting.insert(0, worker.chunk)
 
 
-def _work(task: SolverTask, key: str, connection: Connection, current: Any, parent: int, bound: bool) -> None:
+def _work(task: LabelTask, key: str, connection: Connection, current: Any, parent: int, bound: bool) -> None:
     for ignored in (signal.SIGINT, signal.SIGHUP):
         signal.signal(ignored, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
@@ -188,7 +175,7 @@ def _work(task: SolverTask, key: str, connection: Connection, current: Any, pare
         connection.send((number, traceback.format_exc()))
 
 
-def _label_chunk(solver: Solver, indices: Sequence[int], crashed: Sequence[int], current: Any) -> Shard:
+def _label_chunk(solver: Labeller, indices: Sequence[int], crashed: Sequence[int], current: Any) -> Shard:
     labels: dict[int, dict[str, Any]] = {}
     rejected: dict[int, str] = {}
     for index, sample in zip(indices, solver.draw(np.array(indices)), strict=True):

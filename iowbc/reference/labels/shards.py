@@ -1,5 +1,6 @@
 """Labels in shards on disk, from which an interrupted stage resumes."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from io import BytesIO
@@ -72,6 +73,4 @@ def merge(shards: Sequence[Shard]) -> Shard:
 
 def reasons(result: Shard) -> dict[str, int]:
     """Counts of the reasons for rejection, most frequent first."""
-    names, counts = np.unique(np.array(result.reasons, dtype=np.str_), return_counts=True)
-    order = np.argsort(-counts, kind="stable")
-    return {str(names[i]): int(counts[i]) for i in order}
+    return dict(Counter(sorted(result.reasons)).most_common())

@@ -41,10 +41,10 @@ def moved(support: SupportModel, posture: Posture, **tangent: float) -> Posture:
 
 def test_a_good_label_passes_with_its_evidence(judge: LabelChecker, sample: Sample, label: Posture) -> None:
     evidence = judge.label(sample, label)
-    assert evidence.height == pytest.approx(0.66, abs=0.002)
-    assert 0.04 < evidence.margin < 0.12
-    assert evidence.torque.shape == (15,)
-    assert 10.0 < np.abs(evidence.torque).max() < 50.0
+    assert evidence["reached"] == pytest.approx(0.66, abs=0.002)
+    assert 0.04 < evidence["margin"] < 0.12
+    assert evidence["torque"].shape == (15,)
+    assert 10.0 < np.abs(evidence["torque"]).max() < 50.0
 
 
 def test_a_label_of_other_arms_is_not_in_equilibrium(

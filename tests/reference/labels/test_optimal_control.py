@@ -11,7 +11,7 @@ from iowbc.recipe.generator import LabelGates, PostureProblem, ReferenceGenerato
 from iowbc.reference.labels.checks import chosen_for_crosscheck, compare_methods
 from iowbc.reference.labels.dataset import Dataset
 from iowbc.reference.labels.gates import LabelChecker
-from iowbc.reference.labels.gauss_newton import KinematicStart
+from iowbc.reference.labels.gauss_newton import kinematic_start
 from iowbc.reference.labels.optimal_control import OptimalControlMethod, distribute
 from iowbc.reference.labels.plan import SamplePlan
 from iowbc.reference.labels.sample import Sample
@@ -83,11 +83,10 @@ def test_the_ground_carries_the_robots_weight(method: OptimalControlMethod, comm
 
 
 def test_the_kinematic_start_stands_as_commanded(support: SupportModel, command: Callable[..., Sample]) -> None:
-    start = KinematicStart(support, "pelvis")
     for height, pitch in COMMANDS:
         sample = command(height, pitch)
         support.lock(sample)
-        q = start.posture(sample)
+        q = kinematic_start(support, "pelvis", sample)
         com = pinocchio.centerOfMass(support.model, support.data, q).copy()
         pinocchio.framesForwardKinematics(support.model, support.data, q)
         for sole, place in zip(support.soles, support.stance, strict=True):
