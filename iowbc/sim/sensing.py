@@ -134,11 +134,6 @@ class Sensing:
         if not self._all_see:
             thing[~state.has_object] = NOT_SEEN
 
-    def restored(self) -> None:
-        """Must be called after the arrays were overwritten."""
-        self._robot_line.restored()
-        self._object_line.restored()
-
     def arrays(self) -> dict[str, Array]:
         own = {"mounting": self._mounting, "gyro_bias": self._gyro_bias}
         own |= {"drift": self._drift, "drifted": self._drifted}

@@ -323,7 +323,6 @@ class Simulation:
             start = f"world{index}/"
             world.restore({k.removeprefix(start): v for k, v in saved.items() if k.startswith(start)})
         self.partner.restored()
-        self._sensing.restored()
 
     def world_of(self, env: int) -> tuple[World, int]:
         """The world of an environment, and its index there."""
