@@ -89,12 +89,12 @@ class Schedule:
         if self._trials is not None:
             return {}
         hardness = difficulty(self._task.curriculum, self._memory.played[which])
-        blocked = random.uniform(key, "episode/blocked", 1)[:, 0] < hardness.blocked
+        blocked = random.uniform(key, "episode/blocked", 1)[:, 0] < hardness["blocked"]
         return {
-            "load_scale": hardness.load,
-            "resistance_scale": np.where(blocked, self._task.curriculum.blocking, hardness.resistance),
-            "impulse_scale": hardness.disturbance,
-            "push_scale": hardness.disturbance,
+            "load_scale": hardness["load"],
+            "resistance_scale": np.where(blocked, self._task.curriculum.blocking, hardness["resistance"]),
+            "impulse_scale": hardness["disturbance"],
+            "push_scale": hardness["disturbance"],
         }
 
     def _time_limits(self, which: Indices, key: Keys) -> NDArray[np.int64]:
