@@ -25,14 +25,13 @@ class Commander:
         scripts: Sequence[CommandScript | None],
         holding: Mask,
         pushing: Mask,
-        period: float,
     ) -> None:
         """`holding`: environments that begin with an object in the hands, `pushing`: with a crate in front, (n,)."""
         commands = task.commands
         self._nominal, self._start = nominal_command(commands), np.where(holding, commands.holding_start, 1.0)[:, None]
-        self._commands, self._curriculum, self._references, self._period = commands, task.curriculum, references, period
-        self._pushing = pushing
-        self._largest_step = rate_limits(commands.rates) * period
+        self._commands, self._curriculum, self._references = commands, task.curriculum, references
+        self._pushing, self._period = pushing, 1.0 / task.control_frequency
+        self._largest_step = rate_limits(commands.rates) * self._period
         self.scripted = np.array([script is not None for script in scripts])
         self._drawn, self._any_script = ~self.scripted, bool(self.scripted.any())
         self._times, self._values = _knots(scripts)
