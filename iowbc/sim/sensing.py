@@ -41,7 +41,6 @@ class Sensing:
         """Columns of the robot's own quantities; those of the object come last."""
         self._inertial = slice(columns["base_angular_velocity"].start, columns["projected_gravity"].stop)
         self._see_object, self._all_see = bool(has_object.any()), bool(has_object.all())
-        self._world = np.zeros((n, 3, 3))
         true = np.zeros((n, self.noise_width))
         self._sensed = {name: true[:, place] for name, place in columns.items()}
         """Measurements without noise and latency; the heading is unwrapped for the delay line."""
@@ -105,11 +104,9 @@ class Sensing:
         heading += rotations.wrapped(np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0]) + self._drifted - heading)
         if not self._see_object:
             return
-        world, turning = self._world, state.base_angular_velocity
-        np.subtract(state.object_position, state.base_position, out=world[:, 0])
-        np.subtract(state.object_linear_velocity, state.base_linear_velocity, out=world[:, 1])
-        world[:, 2] = state.object_angular_velocity
-        seen = world @ rotation
+        turning, away = state.base_angular_velocity, state.object_position - state.base_position
+        velocity = state.object_linear_velocity - state.base_linear_velocity
+        seen = np.stack([away, velocity, state.object_angular_velocity], axis=1) @ rotation
         sensed["object_position"][:] = place = seen[:, 0]
         np.subtract(seen[:, 1], rotations.cross(turning, place), out=sensed["object_linear_velocity"])
         np.subtract(seen[:, 2], turning, out=sensed["object_angular_velocity"])

@@ -43,7 +43,6 @@ class Judge:
         self._holding, self._training, self._period = holding, training, 1.0 / recipe.task.control_frequency
         self._reward = RewardFunction(recipe.task.reward, self._period, own=training)
         self._admittance = Admittance(recipe.task.reward.yielding, holding)
-        self._velocity = np.zeros((len(holding), 3))
 
     def motion(self, state: SimulationState) -> Motion:
         return motion(state, self._height)
@@ -101,10 +100,9 @@ class Judge:
 
     def _filter(self, memory: EpisodeState, moved: Motion, resistance: Array) -> None:
         """Low-passes velocities, and the hand force beyond the robot's share of a crate's `resistance` (n,) [N]."""
-        self._velocity[:, :YAW_RATE] = moved.system_velocity[:, :YAW_RATE]
-        self._velocity[:, YAW_RATE] = moved.yaw_rate
+        velocity = np.column_stack([moved.system_velocity[:, :YAW_RATE], moved.yaw_rate])
         time_constant = self._task.reward.sync.filter_time
-        memory.filtered_velocity[:] = low_pass(memory.filtered_velocity, self._velocity, time_constant, self._period)
+        memory.filtered_velocity[:] = low_pass(memory.filtered_velocity, velocity, time_constant, self._period)
         if not self._admittance.idle:
             needed = np.where(memory.infeasible, 0.0, resistance)
             force = excess_force(moved.hand_force, memory.command[:, :YAW_RATE], needed)
