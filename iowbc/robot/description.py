@@ -112,49 +112,51 @@ def load_robot(folder: Path) -> Robot:
     Raises OSError for a file that is not there, ValueError with the file, the entry, and what would be valid.
     """
     source = folder / DESCRIPTION
+    text = small_text(source)
     try:
-        entries = yaml.safe_load(small_text(source))
-        if not isinstance(entries, Mapping):
-            raise ValueError(f"{source}: expected a mapping of entries, found {type(entries).__name__}")
-        return _described(folder, source, entries)
+        return _described(folder, yaml.safe_load(text))
+    except ValueError as error:
+        raise ValueError(f"{source}: {error}") from error
     except (yaml.YAMLError, LookupError, TypeError, AttributeError, RecursionError) as error:
         raise ValueError(f"{source}: describes no robot: {type(error).__name__}: {error}") from error
 
 
-def _described(folder: Path, source: Path, entries: Mapping[str, Any]) -> Robot:
+def _described(folder: Path, entries: Any) -> Robot:
+    if not isinstance(entries, Mapping):
+        raise ValueError(f"expected a mapping of entries, found {type(entries).__name__}")
     needed = ("name", "mjcf", "base", "torso", "soles", "wrists", "support", "joints")
     missing = [key for key in needed if key not in entries]
     if missing:
-        raise ValueError(f"{source}: missing {', '.join(missing)}")
+        raise ValueError(f"missing {', '.join(missing)}")
     mjcf = folder / entries["mjcf"]
     if mjcf.name != entries["mjcf"]:
-        raise ValueError(f"{source}: mjcf: {shown(entries['mjcf'])} is not the name of a file in this folder")
+        raise ValueError(f"mjcf: {shown(entries['mjcf'])} is not the name of a file in this folder")
     tree = read_tree(mjcf)
     hinges = tree.hinges()
     joints = tuple(hinge.name for hinge in hinges)
     for key in ("base", "torso"):
         if entries[key] not in tree.bodies:
-            raise ValueError(
-                f"{source}: {key}: no body {entries[key]!r} in {mjcf.name}; it has {', '.join(tree.bodies)}"
-            )
-    support = _support(entries["support"], joints, source)
-    rows = [_row(entries["joints"], name, source) for name in joints]
+            raise ValueError(f"{key}: no body {entries[key]!r} in {mjcf.name}; it has {', '.join(tree.bodies)}")
+    support = _indices("support", entries["support"], joints)
+    pairs = entries.get("linkages", [])
+    if any(len(pair) != 2 for pair in pairs):
+        raise ValueError(f"linkages: expected pairs of joints, found {pairs}")
+    rows = [_row(entries["joints"], name) for name in joints]
     unused = set(entries["joints"]) - {kind_of(name) for name in joints}
     if unused:
-        raise ValueError(f"{source}: joints: no joint of {mjcf.name} is of kind {', '.join(sorted(unused))}")
+        raise ValueError(f"joints: no joint of {mjcf.name} is of kind {', '.join(sorted(unused))}")
     default = np.array([side_sign(row, name) * float(row["default"]) for row, name in zip(rows, joints, strict=True)])
     lower = np.array([hinge.lower for hinge in hinges])
     upper = np.array([hinge.upper for hinge in hinges])
     for index, name in enumerate(joints):
         if not lower[index] <= default[index] <= upper[index]:
             raise ValueError(
-                f"{source}: default position {default[index]} of {name} is outside its range "
-                f"{lower[index]} to {upper[index]} rad"
+                f"default position {default[index]} of {name} is outside its range {lower[index]} to {upper[index]} rad"
             )
     scales = [rows[index].get("scale") for index in support]
     if None in scales:
-        raise ValueError(f"{source}: joints: support joint {joints[support[scales.index(None)]]} has no `scale`")
-    wrists, soles = _pair(entries, "wrists", source), _pair(entries, "soles", source)
+        raise ValueError(f"joints: support joint {joints[support[scales.index(None)]]} has no `scale`")
+    wrists, soles = _pair(entries, "wrists"), _pair(entries, "soles")
     grips, sole_bodies = [tree.carrier(site) for site in wrists], [tree.body_of_site(site) for site in soles]
     waist = tree.hinges_between(entries["torso"], entries["base"])
     posture = dict(zip(joints, default.tolist(), strict=True))
@@ -166,15 +168,15 @@ def _described(folder: Path, source: Path, entries: Mapping[str, Any]) -> Robot:
         joints=joints,
         support=support,
         interaction=np.array([index for index in range(len(joints)) if index not in set(support.tolist())]),
-        waist=_places(waist, support, joints, source),
-        waist_pitch=_places([hinge for hinge in waist if _is_pitch(hinge)], support, joints, source),
+        waist=_places(waist, support, joints),
+        waist_pitch=_places([hinge for hinge in waist if _is_pitch(hinge)], support, joints),
         lateral=np.flatnonzero([not _is_pitch(hinges[index]) for index in support]),
         kp=np.array([float(row["kp"]) for row in rows]),
         kd=np.array([float(row["kd"]) for row in rows]),
         effort=np.array([hinge.effort for hinge in hinges]),
         armature=np.array([hinge.armature for hinge in hinges]),
         velocity_limit=np.array([float(row["velocity"]) for row in rows]),
-        linkages=_linkages(entries.get("linkages", []), joints, source),
+        linkages=_indices("linkages", [name for pair in pairs for name in pair], joints).reshape(-1, 2),
         lower=lower,
         upper=upper,
         default_position=default,
@@ -198,15 +200,15 @@ def kind_of(joint: str) -> str:
     return joint.removeprefix("left_").removeprefix("right_").removesuffix("_joint")
 
 
-def _row(rows: Mapping[str, Mapping[str, Any]], joint: str, source: Path) -> Mapping[str, Any]:
+def _row(rows: Mapping[str, Mapping[str, Any]], joint: str) -> Mapping[str, Any]:
     row = rows.get(kind_of(joint))
     if row is None:
-        raise ValueError(f"{source}: joints: no row {kind_of(joint)!r} for {joint}; rows: {', '.join(rows)}")
+        raise ValueError(f"joints: no row {kind_of(joint)!r} for {joint}; rows: {', '.join(rows)}")
     unknown = set(row) - ROW_KEYS
     absent = {"kp", "kd", "velocity", "default"} - set(row)
     if unknown or absent:
         raise ValueError(
-            f"{source}: joints.{kind_of(joint)}: unknown {sorted(unknown)}, missing {sorted(absent)}; "
+            f"joints.{kind_of(joint)}: unknown {sorted(unknown)}, missing {sorted(absent)}; "
             f"a row has {', '.join(sorted(ROW_KEYS))}"
         )
     return row
@@ -217,11 +219,12 @@ def side_sign(row: Mapping[str, Any], joint: str) -> float:
     return -1.0 if row.get("mirrored", False) and joint.startswith("right_") else 1.0
 
 
-def _support(names: list[str], joints: tuple[str, ...], source: Path) -> Indices:
+def _indices(key: str, names: list[str], joints: tuple[str, ...]) -> Indices:
+    """Places of the joints that an entry names, each once."""
     unknown = [name for name in names if name not in joints]
     if unknown or len(set(names)) != len(names):
-        raise ValueError(f"{source}: support: unknown or repeated joints {unknown}; the MJCF has {', '.join(joints)}")
-    return np.array([joints.index(name) for name in names])
+        raise ValueError(f"{key}: unknown or repeated joints {unknown}; the MJCF has {', '.join(joints)}")
+    return np.array([joints.index(name) for name in names], np.int64)
 
 
 def _is_pitch(hinge: Hinge) -> bool:
@@ -229,26 +232,16 @@ def _is_pitch(hinge: Hinge) -> bool:
     return bool(np.argmax(np.abs(hinge.axis)) == 1)
 
 
-def _places(hinges: Sequence[Hinge], support: Indices, joints: tuple[str, ...], source: Path) -> Indices:
+def _places(hinges: Sequence[Hinge], support: Indices, joints: tuple[str, ...]) -> Indices:
     names = [joints[index] for index in support]
     missing = [hinge.name for hinge in hinges if hinge.name not in names]
     if missing:
-        raise ValueError(f"{source}: support: joints of legs and waist belong to it, missing {', '.join(missing)}")
+        raise ValueError(f"support: joints of legs and waist belong to it, missing {', '.join(missing)}")
     return np.array([names.index(hinge.name) for hinge in hinges], dtype=np.int64)
 
 
-def _linkages(pairs: list[list[str]], joints: tuple[str, ...], source: Path) -> Indices:
-    named = [name for pair in pairs for name in pair]
-    unknown = [name for name in named if name not in joints]
-    if unknown or len(set(named)) != len(named) or any(len(pair) != 2 for pair in pairs):
-        raise ValueError(
-            f"{source}: linkages: expected pairs of different joints, found {pairs}; the MJCF has {', '.join(joints)}"
-        )
-    return np.array([[joints.index(name) for name in pair] for pair in pairs], np.int64).reshape(-1, 2)
-
-
-def _pair(entries: Mapping[str, Any], key: str, source: Path) -> tuple[str, str]:
+def _pair(entries: Mapping[str, Any], key: str) -> tuple[str, str]:
     value = entries[key]
     if not isinstance(value, list) or len(value) != 2:
-        raise ValueError(f"{source}: {key}: expected [left, right], found {value!r}")
+        raise ValueError(f"{key}: expected [left, right], found {value!r}")
     return str(value[0]), str(value[1])

@@ -4,25 +4,17 @@ import numpy as np
 
 from iowbc import counter_random as random
 from iowbc.arrays import Array, Indices, Keys
-from iowbc.recipe.simulation.randomization import Distribution, Impulses, Pushes
+from iowbc.recipe.simulation.randomization import Impulses, Pushes
 
 
 class Disturbance:
     """Constant forces of a short duration, in n environments; times, sizes and directions from the episode's key."""
 
-    def __init__(
-        self,
-        name: str,
-        settings: Impulses | Pushes,
-        size: Distribution,
-        n: int,
-        period: float,
-        *,
-        level: bool,
-    ) -> None:
-        """`name`: of the random numbers; `size` of the impulse [N·s], or its part per unit of `scale`; `level`:
-        horizontal directions only."""
-        self._name, self._interval, self._size, self._level = name, settings.interval, size, level
+    def __init__(self, name: str, settings: Impulses | Pushes, n: int, period: float) -> None:
+        """`name`: of the random numbers. Impulses have any direction and a size in N·s; pushes are horizontal, and
+        their size is the change of speed, in N·s per unit of `scale`."""
+        self._name, self._interval, self._level = name, settings.interval, isinstance(settings, Pushes)
+        self._size = settings.speed if isinstance(settings, Pushes) else settings.magnitude
         self._enabled, self._period = settings.enabled, period
         self._length = max(1, round(settings.duration / period))
         self._next, self._until = np.zeros(n, np.int64), np.zeros(n, np.int64)

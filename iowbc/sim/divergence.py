@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Self
 
@@ -11,7 +11,7 @@ import numpy as np
 from iowbc.arrays import Array
 from iowbc.recipe.simulation.simulation import SimulationSettings as Recipe
 from iowbc.robot.description import Robot
-from iowbc.sim.period import Period
+from iowbc.sim.state import Period
 from iowbc.sim.timing import Timing
 from iowbc.sim.world import World
 
@@ -47,5 +47,5 @@ def replay(robot: Robot, recipe: Recipe, divergence: Divergence, timing: Timing)
     world = World(robot, recipe.physics, scene, np.zeros(1, np.int64), timing)
     world.restore({name: values[None] for name, values in arrays.items()})
     diverged = np.zeros(1, bool)
-    world.step(Period.alone(arrays), diverged)
+    world.step(Period(**{field.name: arrays[field.name][None] for field in fields(Period)}), diverged)
     return bool(diverged[0])

@@ -19,7 +19,6 @@ class Drives:
         self._at_rest = self._slope * robot.velocity_limit
         """Torque at rest, extrapolated from the slope, as a multiple of the limit."""
         self._kp, self._kd = robot.kp[robot.linkages], robot.kd[robot.linkages]
-        self._range = np.zeros((n, len(robot.joints), 2))
 
     def reset(self, which: Indices, drawn: dict[str, Array]) -> None:
         pairs, strength = self._robot.linkages, drawn["motor_strength"][which]
@@ -38,10 +37,8 @@ class Drives:
         effort = self.effort.copy()
         self._share(effort, target, state)
         reserve = state.joint_velocity * self._slope
-        ranges = self._range
-        ranges[..., 1] = effort * (self._at_rest - reserve).clip(0.0, 1.0)
-        ranges[..., 0] = -effort * (self._at_rest + reserve).clip(0.0, 1.0)
-        return ranges
+        least = -effort * (self._at_rest + reserve).clip(0.0, 1.0)
+        return np.stack([least, effort * (self._at_rest - reserve).clip(0.0, 1.0)], axis=-1)
 
     def _share(self, effort: Array, target: Array, state: SimulationState) -> None:
         pairs = self._robot.linkages

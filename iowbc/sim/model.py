@@ -8,12 +8,11 @@ import numpy as np
 from iowbc.recipe.simulation.scene import Scene
 from iowbc.recipe.simulation.simulation import Physics
 from iowbc.robot.description import Robot
-from iowbc.sim.objects import OBJECT_BIT, add_object
+from iowbc.sim.objects import GROUND_BIT, OBJECT_BIT, add_object
 from iowbc.sim.timing import Timing
 
 GROUND = "ground"
 """Name of its geom."""
-GROUND_BIT = 1
 FORCE, NET_FORCE = 1 << mujoco.mjtConDataField.mjCONDATA_FORCE.value, 3
 """Output of MuJoCo's contact sensors: the force alone, summed over all contacts."""
 LEG_BITS = (8, 16)
@@ -69,9 +68,8 @@ def scene_spec(robot: Robot, physics: Physics, scene: Scene, timing: Timing, *, 
     spec.worldbody.add_geom(name=GROUND, type=plane, size=[0, 0, 1], contype=GROUND_BIT, conaffinity=0)
     _add_motors(spec, robot, timing)
     if scene.object is not None:
-        ground_bit = GROUND_BIT if scene.kind == "lift" else 0
         touched = physics.body_contact != "nothing"
-        add_object(spec, robot, scene, timing, ground_bit=ground_bit, touched=touched, dressed=dressed)
+        add_object(spec, robot, scene, scene.object, timing, touched=touched, dressed=dressed)
     spec.add_sensor(
         name="contact_forces",
         type=mujoco.mjtSensor.mjSENS_FORCE,

@@ -11,7 +11,7 @@ from iowbc.robot.description import Robot
 from iowbc.sim.shapes import HOLE, HULL, measured
 from iowbc.sim.timing import Timing
 
-OBJECT_BIT = 4
+GROUND_BIT, OBJECT_BIT = 1, 4
 HANDS = ("left_hand", "right_hand")
 """Bodies without mass at the grip points, through which all forces between hands and object pass."""
 NEGLIGIBLE_MASS = 1e-9
@@ -30,20 +30,18 @@ PAINTED = (0.24, 0.42, 0.53, 1.0)
 
 
 def add_object(
-    spec: Any, robot: Robot, scene: Scene, timing: Timing, *, ground_bit: int, touched: bool, dressed: bool
+    spec: Any, robot: Robot, scene: Scene, thing: Object, timing: Timing, *, touched: bool, dressed: bool
 ) -> None:
     """Body `object` with the scene's nominal mass, its joints, the hands with its grips or the palms that touch it.
 
     `touched`: links other than the palms may touch it too; `dressed`: with visual geometry.
     """
-    thing = scene.object
-    if thing is None:
-        raise ValueError("a scene without an object has none to add")
     shape = measured(thing)
     inertial = {"mass": thing.mass, "ipos": OFF_CENTRE, "inertia": shape.principal * thing.mass, "iquat": shape.turn}
     place = [0.0, 0.0, CLEARANCE - shape.low[2]]
     body = spec.worldbody.add_body(name="object", pos=place, explicitinertial=True, **inertial)
     by_contact = scene.kind == "push" or scene.grasp.kind == "contact"
+    ground_bit = GROUND_BIT if scene.kind == "lift" else 0
     bits = {"contype": OBJECT_BIT if by_contact or touched else 0, "conaffinity": ground_bit}
     if thing.shape == "tyre":
         _add_ring(body, thing, bits)

@@ -320,7 +320,6 @@ class Partner:
     def restored(self) -> None:
         """Must be called after the arrays were overwritten."""
         self._derive()
-        self._line.restored()
 
 
 def _length(vectors: Array) -> Array:

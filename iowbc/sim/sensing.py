@@ -9,27 +9,22 @@ from iowbc.robot import rotations
 from iowbc.sim.delay import DelayLine
 from iowbc.sim.state import SimulationState
 
-PLACE, ORIENTATION = slice(0, 3), slice(3, 7)
-SPEED, TURNING = slice(7, 10), slice(10, 13)
+SIZES = {
+    "base_angular_velocity": 3,
+    "projected_gravity": 3,
+    "heading": 1,
+    "object_position": 3,
+    "object_quaternion": 4,
+    "object_linear_velocity": 3,
+    "object_angular_velocity": 3,
+}
+"""Columns of the quantities of `Measured` that follow those of the joints in a row."""
 OBJECT_WIDTH = 13
-NOT_SEEN = np.zeros(OBJECT_WIDTH)
-NOT_SEEN[ORIENTATION.start] = 1.0
+NOT_SEEN = np.eye(1, OBJECT_WIDTH, 3)[0]
 """Measurement without an object: identity, at rest at the base."""
 CONJUGATE_PLACES = np.array([0, 1, 2, 3, 1, 0, 3, 2, 2, 3, 0, 1, 3, 2, 1, 0])
 CONJUGATE_SIGNS = np.array([1, 1, 1, 1, -1, 1, 1, -1, -1, -1, 1, 1, -1, 1, -1, 1.0])
 """Matrix, row by row, of the left multiplication by a quaternion's conjugate."""
-
-
-class Columns:
-    """Columns of a robot's measurements in a row, before those of the object."""
-
-    def __init__(self, joints: int) -> None:
-        self.position, self.velocity = slice(0, joints), slice(joints, 2 * joints)
-        self.angular, self.gravity = slice(2 * joints, 2 * joints + 3), slice(2 * joints + 3, 2 * joints + 6)
-        self.heading = slice(2 * joints + 6, 2 * joints + 7)
-        self.inertial = slice(2 * joints, 2 * joints + 6)
-        self.robot = slice(0, 2 * joints + 7)
-        self.width = self.robot.stop + OBJECT_WIDTH
 
 
 class Sensing:
@@ -37,33 +32,29 @@ class Sensing:
 
     def __init__(self, recipe: Recipe, joints: int, has_object: Mask, longest_latency: int, period: float) -> None:
         n, self._period = len(has_object), period
-        self._columns = columns = Columns(joints)
-        self.noise_width = columns.width
+        sizes = {"joint_position": joints, "joint_velocity": joints, **SIZES}
+        ends = np.cumsum([*sizes.values()]).tolist()
+        columns = {name: slice(end - size, end) for (name, size), end in zip(sizes.items(), ends, strict=True)}
+        self.noise_width = ends[-1]
         """Noise columns that sensing uses per step."""
+        self._width = width = columns["heading"].stop
+        """Columns of the robot's own quantities; those of the object come last."""
+        self._inertial = slice(columns["base_angular_velocity"].start, columns["projected_gravity"].stop)
         self._see_object, self._all_see = bool(has_object.any()), bool(has_object.all())
-        self._world = np.zeros((n, 3, 3))
-        width = columns.robot.stop
-        self._robot, self._object = np.zeros((n, width)), np.zeros((n, OBJECT_WIDTH))
+        true = np.zeros((n, self.noise_width))
+        self._sensed = {name: true[:, place] for name, place in columns.items()}
+        """Measurements without noise and latency; the heading is unwrapped for the delay line."""
+        self._robot, self._object = true[:, :width], true[:, width:]
         self._robot_line = DelayLine(n, width, longest_latency)
         self._object_line = DelayLine(n, OBJECT_WIDTH, longest_latency)
         self._bias = np.zeros((n, joints))
         self._mounting, self._gyro_bias = np.tile(np.eye(3), (n, 1, 1)), np.zeros((n, 3))
         self._drift, self._drifted = np.zeros(n), np.zeros(n)
-        self._deviation = np.zeros((n, columns.width))
-        self._nominal = _deviations(recipe, columns)
-        self.rows = np.zeros((n, columns.width))
-        seen = self.rows[:, width:]
-        self.measured = Measured(
-            joint_position=self.rows[:, columns.position],
-            joint_velocity=self.rows[:, columns.velocity],
-            base_angular_velocity=self.rows[:, columns.angular],
-            projected_gravity=self.rows[:, columns.gravity],
-            heading=self.rows[:, columns.heading],
-            object_position=seen[:, PLACE],
-            object_quaternion=seen[:, ORIENTATION],
-            object_linear_velocity=seen[:, SPEED],
-            object_angular_velocity=seen[:, TURNING],
-        )
+        self._deviation = np.zeros((n, self.noise_width))
+        self._nominal = np.repeat(_deviations(recipe), [*sizes.values()])
+        self.rows = np.zeros((n, self.noise_width))
+        self._quaternion = self.rows[:, columns["object_quaternion"]]
+        self.measured = Measured(**{name: self.rows[:, place] for name, place in columns.items()})
 
     def reset(self, which: Indices, drawn: dict[str, Array], state: SimulationState) -> None:
         """Fills the delay lines of some environments with their current state."""
@@ -73,7 +64,7 @@ class Sensing:
         self._gyro_bias[which] = drawn["gyro_bias"][which]
         self._drift[which], self._drifted[which] = drawn["heading_drift"][which], 0.0
         self._deviation[which] = self._nominal * drawn["noise_scale"][which, None]
-        self._deviation[which, self._columns.robot.stop :] *= state.has_object[which, None]
+        self._deviation[which, self._width :] *= state.has_object[which, None]
         self._robot_line.set_latency(which, drawn["sensor_latency"][which])
         self._object_line.set_latency(which, drawn["object_latency"][which])
         self._sense(state)
@@ -89,55 +80,43 @@ class Sensing:
 
     def deliver(self, noise: Array) -> None:
         """Refreshes `measured`; `noise` (n, noise_width) standard normal."""
-        rows, columns = self.rows, self._columns
+        rows, width = self.rows, self._width
         np.multiply(noise, self._deviation, out=rows)
         seen = self._robot_line.read()
-        inertial = seen[:, columns.inertial].reshape(-1, 2, 3)
+        inertial = seen[:, self._inertial].reshape(-1, 2, 3)
         inertial[...] = inertial @ self._mounting
         inertial[:, 0] += self._gyro_bias
-        rows[:, columns.robot] += seen
-        rows[:, columns.position] += self._bias
-        quaternion = rows[:, columns.robot.stop :][:, ORIENTATION]
+        rows[:, :width] += seen
+        self.measured.joint_position[:] += self._bias
+        quaternion = self._quaternion
         if not self._see_object:
             quaternion[:, 0] = 1.0
             return
-        rows[:, columns.robot.stop :] += self._object_line.read()
+        rows[:, width:] += self._object_line.read()
         quaternion /= np.sqrt(np.vecdot(quaternion, quaternion))[:, None]
 
     def _sense(self, state: SimulationState) -> None:
-        """Computes measurements without noise and latency; the heading is unwrapped for the delay line."""
-        robot, thing, columns = self._robot, self._object, self._columns
-        robot[:, columns.position] = state.joint_position
-        robot[:, columns.velocity] = state.joint_velocity
-        robot[:, columns.angular] = state.base_angular_velocity
-        np.negative(state.base_rotation[:, 2], out=robot[:, columns.gravity])
-        rotation = state.base_rotation
-        heading = robot[:, columns.heading.start]
-        turned = np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0]) + self._drifted - heading
-        heading += rotations.wrapped(turned)
+        sensed, rotation = self._sensed, state.base_rotation
+        sensed["joint_position"][:], sensed["joint_velocity"][:] = state.joint_position, state.joint_velocity
+        sensed["base_angular_velocity"][:] = state.base_angular_velocity
+        np.negative(rotation[:, 2], out=sensed["projected_gravity"])
+        heading = sensed["heading"][:, 0]
+        heading += rotations.wrapped(np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0]) + self._drifted - heading)
         if not self._see_object:
             return
-        world, turning = self._world, state.base_angular_velocity
-        np.subtract(state.object_position, state.base_position, out=world[:, 0])
-        np.subtract(state.object_linear_velocity, state.base_linear_velocity, out=world[:, 1])
-        world[:, 2] = state.object_angular_velocity
-        seen = world @ state.base_rotation
-        place = seen[:, 0]
-        thing[:, PLACE] = place
-        np.subtract(seen[:, 1], rotations.cross(turning, place), out=thing[:, SPEED])
-        np.subtract(seen[:, 2], turning, out=thing[:, TURNING])
+        turning, away = state.base_angular_velocity, state.object_position - state.base_position
+        velocity = state.object_linear_velocity - state.base_linear_velocity
+        seen = np.stack([away, velocity, state.object_angular_velocity], axis=1) @ rotation
+        sensed["object_position"][:] = place = seen[:, 0]
+        np.subtract(seen[:, 1], rotations.cross(turning, place), out=sensed["object_linear_velocity"])
+        np.subtract(seen[:, 2], turning, out=sensed["object_angular_velocity"])
         left = state.base_quaternion.take(CONJUGATE_PLACES, axis=1)
         left *= CONJUGATE_SIGNS
         relative = (left.reshape(-1, 4, 4) @ state.object_quaternion[:, :, None])[:, :, 0]
         relative *= np.copysign(1.0, relative[:, :1])
-        thing[:, ORIENTATION] = relative
+        sensed["object_quaternion"][:] = relative
         if not self._all_see:
-            thing[~state.has_object] = NOT_SEEN
-
-    def restored(self) -> None:
-        """Must be called after the arrays were overwritten."""
-        self._robot_line.restored()
-        self._object_line.restored()
+            self._object[~state.has_object] = NOT_SEEN
 
     def arrays(self) -> dict[str, Array]:
         own = {"mounting": self._mounting, "gyro_bias": self._gyro_bias}
@@ -148,13 +127,10 @@ class Sensing:
         return own
 
 
-def _deviations(recipe: Recipe, columns: Columns) -> Array:
-    """Standard deviation of each column, (width,); a rotation by η changes a unit quaternion by η / 2."""
-    deviation = np.zeros(columns.width)
-    deviation[columns.position], deviation[columns.velocity] = recipe.joint_position, recipe.joint_velocity
-    deviation[columns.angular], deviation[columns.gravity] = recipe.angular_velocity, recipe.gravity
-    deviation[columns.heading] = recipe.heading
-    seen = deviation[columns.robot.stop :]
-    seen[PLACE], seen[ORIENTATION] = recipe.object_position, 0.5 * recipe.object_orientation
-    seen[SPEED], seen[TURNING] = recipe.object_velocity, recipe.object_angular_velocity
-    return deviation
+def _deviations(recipe: Recipe) -> tuple[float, ...]:
+    """Standard deviation of each quantity, in their order; a rotation by η changes a unit quaternion by η / 2."""
+    return (
+        *(recipe.joint_position, recipe.joint_velocity, recipe.angular_velocity, recipe.gravity, recipe.heading),
+        *(recipe.object_position, 0.5 * recipe.object_orientation),
+        *(recipe.object_velocity, recipe.object_angular_velocity),
+    )

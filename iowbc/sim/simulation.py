@@ -20,10 +20,9 @@ from iowbc.sim.disturbance import Disturbance
 from iowbc.sim.divergence import Divergence
 from iowbc.sim.drives import Drives
 from iowbc.sim.episode_draws import Draws
-from iowbc.sim.period import Period
 from iowbc.sim.sensing import Sensing
 from iowbc.sim.snapshots import by_environment, by_world
-from iowbc.sim.state import SimulationState
+from iowbc.sim.state import Period, SimulationState
 from iowbc.sim.timing import Timing
 from iowbc.sim.world import EVERY, World, make_world
 
@@ -100,9 +99,8 @@ class Simulation:
         self._drives = Drives(robot, recipe.physics, n)
         self.motor_effort = self._drives.effort
         """Torque limit of each motor or linkage in these episodes at low speed, (n, joints) [N·m]."""
-        impulses, pushes = recipe.impulses, recipe.pushes
-        self._impulses = Disturbance("impulse", impulses, impulses.magnitude, n, self.period, level=False)
-        self._pushes = Disturbance("push", pushes, pushes.speed, n, self.period, level=True)
+        self._impulses = Disturbance("impulse", recipe.impulses, n, self.period)
+        self._pushes = Disturbance("push", recipe.pushes, n, self.period)
         self._robot_mass = np.zeros(n)
         held = [model.kind == "lift" for model in models]
         by_contact = np.array([model.grasp.kind == "contact" for model in models]) & held
@@ -156,14 +154,13 @@ class Simulation:
         which: Indices,
         joint_position: Array,
         base_pitch: Array | None = None,
-        yaw: Array | None = None,
         key: Keys | None = None,
     ) -> None:
         """Starts new episodes: draws what is random, puts the robot on its soles and the object into its hands.
 
-        `which` (k,); `joint_position` (k, joints) [rad]; `base_pitch` (k,) [rad], zero by default; `yaw` (k,) [rad],
-        drawn by default; `key` (k,): random keys of the episodes, by default the next of each environment. The height
-        of the base follows from kinematics: the lowest corner of the soles touches the ground.
+        `which` (k,); `joint_position` (k, joints) [rad]; `base_pitch` (k,) [rad], zero by default; `key` (k,):
+        random keys of the episodes, by default the next of each environment. The height of the base follows from
+        kinematics: the lowest corner of the soles touches the ground.
         """
         which = np.asarray(which, np.int64)
         if len(which) == 0:
@@ -175,14 +172,13 @@ class Simulation:
             key = random.absorb(self._key[which], self.episode[which])
         self._episode_key[which] = key
         self._draws.draw(which, key, self.fixed)
-        heading = self.drawn["start_yaw"][which] if yaw is None else np.asarray(yaw)
         self.target[which] = joint_position
         state = self.state
         state.diverged[which] = False
         for world, ids, chosen in self._parts(which):
             rows = which[chosen]
             drawn = {name: values[rows] for name, values in self.drawn.items()}
-            world.reset(ids, joint_position[chosen], pitch[chosen], heading[chosen], drawn)
+            world.reset(ids, joint_position[chosen], pitch[chosen], drawn)
             world.gather(state)
             self._robot_mass[world.place] = world.robot_mass
         for name in STARTS_AT_ZERO:
@@ -274,7 +270,7 @@ class Simulation:
     def _keep_divergences(self, world: World, ids: Indices, given: Period) -> None:
         for index in ids:
             row = int(world.rows[index])
-            arrays = world.record(int(index)) | given.of(row)
+            arrays = world.record(int(index)) | {name: values[row] for name, values in vars(given).items()}
             self.divergences.append(
                 Divergence(
                     scene=self.scene_names[row],
@@ -323,7 +319,6 @@ class Simulation:
             start = f"world{index}/"
             world.restore({k.removeprefix(start): v for k, v in saved.items() if k.startswith(start)})
         self.partner.restored()
-        self._sensing.restored()
 
     def world_of(self, env: int) -> tuple[World, int]:
         """The world of an environment, and its index there."""

@@ -17,11 +17,10 @@ from iowbc.sim.grip import Grip, Squeeze
 from iowbc.sim.model import compile_scene, require_stable
 from iowbc.sim.model_fields import ModelFields
 from iowbc.sim.model_index import BASE_ANGULAR, BASE_LINEAR, ModelIndex
-from iowbc.sim.period import Period
 from iowbc.sim.rolling import Rolling
 from iowbc.sim.shapes import measured
 from iowbc.sim.soles import Soles
-from iowbc.sim.state import SimulationState
+from iowbc.sim.state import Period, SimulationState
 from iowbc.sim.timing import Timing
 
 POSITION = mujoco.mjtStage.mjSTAGE_POS.value
@@ -105,11 +104,12 @@ class World:
         thing = self.fields.object_mass
         self._object_part = (thing / (thing + self.robot_mass))[:, None]
 
-    def reset(self, ids: Indices, joint_position: Array, pitch: Array, yaw: Array, drawn: Mapping[str, Array]) -> None:
+    def reset(self, ids: Indices, joint_position: Array, pitch: Array, drawn: Mapping[str, Array]) -> None:
         """Robot in the posture, lowest sole corner on the ground; object in the hands or crate in front of them.
 
         `ids` (k,) in ascending order; all else has a row for each.
         """
+        yaw = drawn["start_yaw"]
         self.batch.reset(ids, stage=NOTHING)
         self.fields.write(ids, drawn)
         self.qpos[ids, :3] = (0.0, 0.0, 1.0)

@@ -66,9 +66,7 @@ class Batch:
         self.scenes = np.array(scenes)
         """Name of each environment's scene, (n,)."""
         self.memory = EpisodeState.blank(n, len(self.robot.interaction), len(self.robot.support))
-        self._schedule = schedule = Schedule(
-            task, self.memory, environments=environments, seed=seed, trials=episodes, period=period
-        )
+        self._schedule = schedule = Schedule(task, self.memory, environments=environments, seed=seed, trials=episodes)
         self.simulation = Simulation(
             self.robot,
             recipe.simulation,
@@ -79,25 +77,11 @@ class Batch:
             control_frequency=task.control_frequency,
             drake=specification.drake,
         )
-        self._holding = np.array([getattr(recipe.simulation.scenes, name).kind == "lift" for name in scenes])
-        self._pushing = pushing = np.array([getattr(recipe.simulation.scenes, name).kind == "push" for name in scenes])
-        self.guidance = Guidance(
-            specification,
-            self.robot,
-            scenes=scenes,
-            holding=self._holding,
-            pushing=pushing,
-            scripts=schedule.planned("script"),
-            period=period,
-        )
-        self.judge = Judge(
-            recipe,
-            self._support,
-            lateral=self.robot.lateral,
-            holding=self._holding,
-            training=episodes is None,
-            period=period,
-        )
+        kinds = np.array([getattr(recipe.simulation.scenes, name).kind for name in scenes])
+        self._holding, self._pushing = kinds == "lift", kinds == "push"
+        scripts = schedule.planned("script")
+        self.guidance = Guidance(specification, self.robot, scenes, self._holding, self._pushing, scripts)
+        self.judge = Judge(recipe, self.robot, self._holding, training=episodes is None)
         self._pushes = PlannedPushes(schedule.planned("push"), period)
         self._pulls = PlannedPulls(schedule.planned("pull"), period)
         self._bound, self._scale = task.action.bound, action_scale(self.robot, task.action)
@@ -155,8 +139,9 @@ class Batch:
         self.finish(judgement)
 
     def record(self, judgement: Judgement, action: Array) -> None:
-        """Writes the signals of the step just made with an action (n, 15)."""
+        """Writes signals and counters of the step just made with an action (n, 15)."""
         simulation, ending = self.simulation, judgement.ending
+        count_step(self.buffers, judgement, self.memory)
         write_signals(self.buffers, simulation.state, judgement.motion, self.memory, ending, self.period)
         if self._schedule.repeats:
             write_trial_signals(self.buffers, simulation, action * self._scale)
@@ -177,7 +162,6 @@ class Batch:
         buffers["done"][:] = done
         buffers["truncated"][:] = ending.truncated
         self._observe(judgement.motion)
-        count_step(buffers, judgement, memory)
         if not done.any():
             return
         which = np.flatnonzero(done)

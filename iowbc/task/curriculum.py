@@ -5,28 +5,22 @@ from dataclasses import dataclass
 import numpy as np
 
 from iowbc.arrays import Array, Mask
-from iowbc.recipe.task.curriculum import Ceilings, Curriculum, Scale
+from iowbc.recipe.task.curriculum import Ceilings, Curriculum
 
 AXES = ("posture", "locomotion", "load", "disturbance")
 """Columns of the levels."""
 POSTURE, LOCOMOTION, LOAD, DISTURBANCE = range(len(AXES))
+SCALES = {
+    **dict.fromkeys(("velocity", "turning"), LOCOMOTION),
+    "posture": POSTURE,
+    **dict.fromkeys(("load", "resistance", "blocked"), LOAD),
+    "disturbance": DISTURBANCE,
+}
+"""Scales of `iowbc.recipe.task.curriculum.Curriculum`, and the axis on whose level each depends."""
 FULL_RANGE_LEVEL = 1.0
 """Level at which the recipe's ranges are used in full; above it commands and loads may be infeasible."""
 ROUNDING = 1e-9
 """Tolerance for comparing levels, which are sums of rises."""
-
-
-@dataclass(frozen=True)
-class Difficulty:
-    """The scales of n environments, each (n,); see `iowbc.recipe.task.curriculum.Curriculum`."""
-
-    velocity: Array
-    turning: Array
-    posture: Array
-    load: Array
-    resistance: Array
-    blocked: Array
-    disturbance: Array
 
 
 @dataclass(frozen=True)
@@ -68,21 +62,13 @@ def played_levels(curriculum: Curriculum, levels: Array, walking: Mask) -> Array
     return held_back if curriculum.enabled else levels.copy()
 
 
-def difficulty(curriculum: Curriculum, played: Array) -> Difficulty:
-    """Scales at levels (n, axes)."""
-    return Difficulty(
-        velocity=_scaled(curriculum.velocity, played[:, LOCOMOTION]),
-        turning=_scaled(curriculum.turning, played[:, LOCOMOTION]),
-        posture=_scaled(curriculum.posture, played[:, POSTURE]),
-        load=_scaled(curriculum.load, played[:, LOAD]),
-        resistance=_scaled(curriculum.resistance, played[:, LOAD]),
-        blocked=_scaled(curriculum.blocked, played[:, LOAD]),
-        disturbance=_scaled(curriculum.disturbance, played[:, DISTURBANCE]),
-    )
-
-
-def _scaled(scale: Scale, level: Array) -> Array:
-    return np.interp(level, (0.0, 1.0, 2.0), (scale.start, scale.full, scale.extreme))
+def difficulty(curriculum: Curriculum, played: Array) -> dict[str, Array]:
+    """The scales at levels (n, axes), by name in `SCALES`, (n,)."""
+    scales = {name: getattr(curriculum, name) for name in SCALES}
+    return {
+        name: np.interp(played[:, SCALES[name]], (0.0, 1.0, 2.0), (scale.start, scale.full, scale.extreme))
+        for name, scale in scales.items()
+    }
 
 
 def phase(curriculum: Curriculum, levels: Array) -> Array:

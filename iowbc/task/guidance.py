@@ -25,21 +25,19 @@ class Guidance:
         self,
         specification: Specification,
         robot: Robot,
-        *,
         scenes: Sequence[str],
         holding: Mask,
         pushing: Mask,
         scripts: Sequence[CommandScript | None],
-        period: float,
     ) -> None:
         """`scenes`: scene of each environment, by name.
 
         `holding`: those that begin with an object in the hands, `pushing`: those with a crate in front of them, (n,).
         """
         task = specification.recipe.task
-        self._period = period
+        self._period = 1.0 / task.control_frequency
         self.references = ReferenceLayer(robot, task.references, specification.rg)
-        self.commander = Commander(task, self.references, scripts, holding, pushing, period)
+        self.commander = Commander(task, self.references, scripts, holding, pushing)
         self.grasp = np.stack([both_wrists(getattr(task.references.grasps, name)) for name in scenes])
         """Base grasp of both wrists, heading frame, (n, 2, 3) [m]."""
         self._load = np.array([getattr(task.references.loads, name) for name in scenes])

@@ -3,12 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from iowbc.arrays import Array, Indices, Mask
+from iowbc.arrays import Array, Mask, as_slice
 from iowbc.control import gait
 from iowbc.control.command import PITCH, YAW_RATE
 from iowbc.recipe.recipe import Recipe
+from iowbc.robot.description import Robot
 from iowbc.robot.rotations import wrapped
 from iowbc.sim.state import SimulationState
 from iowbc.task.curriculum import FULL_RANGE_LEVEL, LOCOMOTION
@@ -28,8 +28,6 @@ class Judgement:
     motion: Motion
     ending: Ending
     scored: RewardResult
-    command: Array
-    """C during the step, (n, 11)."""
     heading_error: Array
     """Heading less its reference, (n,) [rad]."""
 
@@ -37,25 +35,14 @@ class Judgement:
 class Judge:
     """Evaluates the control steps of n environments."""
 
-    def __init__(
-        self,
-        recipe: Recipe,
-        support: slice | NDArray[np.intp],
-        *,
-        lateral: Indices,
-        holding: Mask,
-        training: bool,
-        period: float,
-    ) -> None:
-        """`support`: indices of the support joints; `lateral`: indices among them, see `Robot.lateral`; `holding`:
-        environments that begin with an object in the hands, (n,); `training`: execute user-defined reward terms, and
-        end the episodes of robots that lag behind the command or lose their crate."""
+    def __init__(self, recipe: Recipe, robot: Robot, holding: Mask, *, training: bool) -> None:
+        """`holding`: environments that begin with an object in the hands, (n,); `training`: execute user-defined reward
+        terms, and end the episodes of robots that lag behind the command or lose their crate."""
         self._task, self._height = recipe.task, recipe.rg.height
-        self._support, self._lateral = support, lateral
-        self._holding, self._training, self._period = holding, training, period
-        self._reward = RewardFunction(recipe.task.reward, period, own=training)
+        self._support, self._lateral = as_slice(robot.support), robot.lateral
+        self._holding, self._training, self._period = holding, training, 1.0 / recipe.task.control_frequency
+        self._reward = RewardFunction(recipe.task.reward, self._period, own=training)
         self._admittance = Admittance(recipe.task.reward.yielding, holding)
-        self._velocity = np.zeros((len(holding), 3))
 
     def motion(self, state: SimulationState) -> Motion:
         return motion(state, self._height)
@@ -109,14 +96,13 @@ class Judge:
             ended=ending.failed,
         )
         scored = self._reward(step, ending.diverged, memory.played[:, LOCOMOTION])
-        return Judgement(moved, ending, scored, memory.command.copy(), error)
+        return Judgement(moved, ending, scored, error)
 
     def _filter(self, memory: EpisodeState, moved: Motion, resistance: Array) -> None:
         """Low-passes velocities, and the hand force beyond the robot's share of a crate's `resistance` (n,) [N]."""
-        self._velocity[:, :YAW_RATE] = moved.system_velocity[:, :YAW_RATE]
-        self._velocity[:, YAW_RATE] = moved.yaw_rate
+        velocity = np.column_stack([moved.system_velocity[:, :YAW_RATE], moved.yaw_rate])
         time_constant = self._task.reward.sync.filter_time
-        memory.filtered_velocity[:] = low_pass(memory.filtered_velocity, self._velocity, time_constant, self._period)
+        memory.filtered_velocity[:] = low_pass(memory.filtered_velocity, velocity, time_constant, self._period)
         if not self._admittance.idle:
             needed = np.where(memory.infeasible, 0.0, resistance)
             force = excess_force(moved.hand_force, memory.command[:, :YAW_RATE], needed)

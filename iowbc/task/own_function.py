@@ -5,7 +5,7 @@ import linecache
 from collections.abc import Callable
 from dataclasses import dataclass
 from types import FunctionType, ModuleType
-from typing import Any, Generic, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -13,8 +13,6 @@ from iowbc.arrays import Array, Mask
 from iowbc.errors import StageFailed, nearest
 from iowbc.recipe.beside import CustomFunction, ModuleFile
 
-Source = TypeVar("Source")
-"""Type of a function's argument."""
 ArrayShape = tuple[int | None, ...]
 """Shape of an array; None stands for any length."""
 LARGEST = float(np.finfo(np.float32).max)
@@ -22,7 +20,7 @@ LARGEST = float(np.finfo(np.float32).max)
 
 
 @dataclass(frozen=True)
-class CheckedFunction(Generic[Source]):
+class CheckedFunction:
     """A function whose values are checked against its contract."""
 
     where: str
@@ -30,9 +28,9 @@ class CheckedFunction(Generic[Source]):
     contract: str
     """Description of argument and return value."""
     file: ModuleFile
-    function: Callable[[Source], Any]
+    function: Callable[[Any], Any]
 
-    def __call__(self, source: Source, *shapes: ArrayShape, excused: Mask | None = None) -> Array:
+    def __call__(self, source: Any, *shapes: ArrayShape, excused: Mask | None = None) -> Array:
         """Values of the function, of one of the shapes, (n, ...). `excused`: rows that need not be finite, (n,).
 
         Raises StageFailed if the function raises or returns anything else.
@@ -55,7 +53,7 @@ class CheckedFunction(Generic[Source]):
         return found
 
 
-def load_function(path: str, own: CustomFunction, contract: str) -> CheckedFunction[Any]:
+def load_function(path: str, own: CustomFunction, contract: str) -> CheckedFunction:
     """Executes the file of a function. `path`: in the recipe; `contract`: see `CheckedFunction`.
 
     Raises StageFailed where it cannot be used.
@@ -65,9 +63,9 @@ def load_function(path: str, own: CustomFunction, contract: str) -> CheckedFunct
         module = _executed(own.module)
     except Exception as error:
         raise StageFailed(f"{where}: cannot be executed: {_told(error, own.module)}") from error
-    functions = [known for known, value in vars(module).items() if isinstance(value, FunctionType)]
     function = getattr(module, own.function, None)
     if not callable(function):
+        functions = [known for known, value in vars(module).items() if isinstance(value, FunctionType)]
         known = ", ".join(functions) or "none"
         hint = nearest(own.function, functions)
         raise StageFailed(f"{where}: has no function {own.function!r}; there are: {known}{hint}; {contract}")

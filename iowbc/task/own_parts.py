@@ -1,37 +1,19 @@
 """User-defined parts of s_priv. Their file is executed when a row is filled, not when a layout is read."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from functools import cached_property
 
 from iowbc.arrays import Array
 from iowbc.control.layout import Part
 from iowbc.errors import StageFailed
 from iowbc.recipe.task.task import CustomPart, Observation
 from iowbc.robot.mirror import in_place
-from iowbc.task.own_function import CheckedFunction, load_function
+from iowbc.task.own_function import load_function
 from iowbc.task.privileged import PRIVILEGED, Truth
 
 CONTRACT = (
     "it takes the Truth (iowbc/task/privileged.py) of n environments and returns finite numbers, shape (n, k), "
     "where k is the number of signs in `mirror`"
 )
-
-
-@dataclass(frozen=True)
-class OwnValue:
-    """The values of a part."""
-
-    path: str
-    said: CustomPart
-
-    @cached_property
-    def function(self) -> CheckedFunction[Truth]:
-        """The user's function. Raises StageFailed where it cannot be used."""
-        return load_function(self.path, self.said, CONTRACT)
-
-    def __call__(self, truth: Truth) -> Array:
-        return self.function(truth, (len(truth.motor_effort), len(self.said.mirror)))
 
 
 def own_parts(recipe: Observation) -> tuple[Part[Truth], ...]:
@@ -63,7 +45,12 @@ def _part(name: str, said: CustomPart) -> Part[Truth]:
     either makes another observation."""
     unit = f"of {said.function} in {said.module.sha256[:12]}"
     frame = f"mirror {', '.join(map(str, said.mirror))}"
-    return Part(name, in_place(*said.mirror), unit, frame, OwnValue(_path(name), said))
+
+    def value(truth: Truth) -> Array:
+        function = load_function(_path(name), said, CONTRACT)  # executes the file at the first call
+        return function(truth, (len(truth.motor_effort), len(said.mirror)))
+
+    return Part(name, in_place(*said.mirror), unit, frame, value)
 
 
 def _path(name: str) -> str:

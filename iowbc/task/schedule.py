@@ -27,11 +27,10 @@ class Schedule:
         environments: NDArray[np.int64],
         seed: int,
         trials: Sequence[Episode] | None,
-        period: float,
     ) -> None:
         """`environments`: global indices, (n,); `trials`: one per environment; None draws episodes at random."""
         n = len(environments)
-        self._task, self._memory, self._trials, self._period = task, memory, trials, period
+        self._task, self._memory, self._trials, self._period = task, memory, trials, 1.0 / task.control_frequency
         self.seeds, self.streams = np.full(n, seed, np.uint64), environments
         if trials is not None:
             self.seeds = np.array([episode.seed for episode in trials], np.uint64)
@@ -89,12 +88,12 @@ class Schedule:
         if self._trials is not None:
             return {}
         hardness = difficulty(self._task.curriculum, self._memory.played[which])
-        blocked = random.uniform(key, "episode/blocked", 1)[:, 0] < hardness.blocked
+        blocked = random.uniform(key, "episode/blocked", 1)[:, 0] < hardness["blocked"]
         return {
-            "load_scale": hardness.load,
-            "resistance_scale": np.where(blocked, self._task.curriculum.blocking, hardness.resistance),
-            "impulse_scale": hardness.disturbance,
-            "push_scale": hardness.disturbance,
+            "load_scale": hardness["load"],
+            "resistance_scale": np.where(blocked, self._task.curriculum.blocking, hardness["resistance"]),
+            "impulse_scale": hardness["disturbance"],
+            "push_scale": hardness["disturbance"],
         }
 
     def _time_limits(self, which: Indices, key: Keys) -> NDArray[np.int64]:

@@ -31,8 +31,8 @@ FIELDS = (
     *("actuator_gainprm", "actuator_biasprm"),
 )
 """Arrays of the model that are written in full precision."""
-STILL = ("partner_share", "impulse_scale", "push_scale", "noise_scale")
-"""Quantities of an episode that are zero on the page: no partner, no disturbances, no sensor noise."""
+STILL = ("start_yaw", "partner_share", "impulse_scale", "push_scale", "noise_scale")
+"""Quantities of an episode that are zero on the page: initial heading, partner, disturbances, sensor noise."""
 ABOVE = 1e-6
 """Initial height above the ground [m]. For soles exactly on the ground, contacts would depend on rounding, which
 differs in the browser."""
@@ -136,7 +136,7 @@ def begun(world: Specification, robot: Robot, name: str, mass: float = np.nan) -
     arms, posture = references.start(command, both_wrists(getattr(recipe.task.references.grasps, name))[None])
     joints = np.empty((1, len(robot.joints)))
     joints[:, robot.support], joints[:, robot.interaction] = posture, arms
-    simulation.reset(np.zeros(1, np.int64), joints, references.start_pitch(posture, command), np.zeros(1))
+    simulation.reset(np.zeros(1, np.int64), joints, references.start_pitch(posture, command))
     simulation.worlds[0].qpos[:, 2] += ABOVE
     simulation.worlds[0].batch.forward()
     return simulation

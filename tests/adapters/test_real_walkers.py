@@ -108,9 +108,9 @@ def with_own_arms(
     for name, values in zip(own, (adapter.kp, adapter.kd, adapter.default), strict=True):
         own[name][places] = values
     world = SimulationSettings.model_validate({"randomization": {"enabled": False}, "sensing": {"enabled": False}})
-    calm = {"impulse_scale": np.zeros(1), "push_scale": np.zeros(1)}
+    calm = {"impulse_scale": np.zeros(1), "push_scale": np.zeros(1), "start_yaw": np.zeros(1)}
     simulation = Simulation(replace(robot, **own), world, envs=np.zeros(1), seed=0, scenes=["free"], fixed=calm)
-    simulation.reset(np.zeros(1, np.int64), own["default_position"][None], yaw=np.zeros(1))
+    simulation.reset(np.zeros(1, np.int64), own["default_position"][None])
     action, height, begin = np.zeros((1, len(places))), np.inf, np.zeros(3)
     for step in range(round((still + walk) * 50)):
         moving, measured = step >= 50 * still, simulation.measured

@@ -69,7 +69,7 @@ def test_a_steered_partner_pulls_the_handle_where_it_wants_and_turns_the_object(
         robot, Recipe(name="test").simulation, envs=np.zeros(n), seed=0, scenes=["lift"] * n, fixed=fixed
     )
     simulation.partner.steered[:] = True
-    simulation.reset(np.arange(n), np.tile(robot.default_position, (n, 1)), yaw=np.zeros(n))
+    simulation.reset(np.arange(n), np.tile(robot.default_position, (n, 1)))
     for _ in range(25):
         simulation.feed[:] = wanted
         simulation.step()

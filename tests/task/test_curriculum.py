@@ -137,10 +137,10 @@ def test_without_a_curriculum_levels_stay() -> None:
 def test_levels_go_from_light_loads_near_the_nominal_posture_to_more_than_the_recipes_ranges() -> None:
     levels = np.array([[0.0] * 4, [1.0] * 4, [1.5] * 4, [2.0] * 4])
     scales = difficulty(Curriculum(), levels)
-    assert scales.velocity.tolist() == pytest.approx([1.0, 1.0, 1.15, 1.3])
-    assert scales.turning.tolist() == pytest.approx([0.2, 1.0, 1.15, 1.3])
-    assert scales.load.tolist() == pytest.approx([0.15, 1.0, 1.15, 1.3])
-    assert scales.disturbance.tolist() == pytest.approx([0.0, 1.0, 1.25, 1.5])
+    assert scales["velocity"].tolist() == pytest.approx([1.0, 1.0, 1.15, 1.3])
+    assert scales["turning"].tolist() == pytest.approx([0.2, 1.0, 1.15, 1.3])
+    assert scales["load"].tolist() == pytest.approx([0.15, 1.0, 1.15, 1.3])
+    assert scales["disturbance"].tolist() == pytest.approx([0.0, 1.0, 1.25, 1.5])
 
 
 def test_a_stepping_statue_does_not_climb(make: Make) -> None:

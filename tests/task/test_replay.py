@@ -20,7 +20,7 @@ def schedule(recipe: Recipe):
     def make(replay: float) -> Schedule:
         task = changed(recipe, "task.curriculum.replay", replay).task
         memory = EpisodeState.blank(COUNT, 14, 15)
-        return Schedule(task, memory, environments=EVERY, seed=0, trials=None, period=0.02)
+        return Schedule(task, memory, environments=EVERY, seed=0, trials=None)
 
     return make
 

@@ -32,7 +32,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from iowbc.arrays import Array
 from iowbc.recipe.evaluation.evaluation import Drake
-from iowbc.sim.model import GROUND_BIT
+from iowbc.sim.objects import GROUND_BIT
 
 FREE = mujoco.mjtJoint.mjJNT_FREE.value
 MIN_STIFFNESS = 1e-9

@@ -11,8 +11,8 @@ from iowbc.recipe.simulation.simulation import Physics
 from iowbc.robot import rotations
 from iowbc.robot.description import Robot
 from iowbc.sim.drake.environment import DrakeEnvironment
-from iowbc.sim.period import Period
 from iowbc.sim.soles import Soles
+from iowbc.sim.state import Period
 from iowbc.sim.timing import Timing
 from iowbc.sim.world import FEET, HANDS, THING, World
 
@@ -50,8 +50,8 @@ class DrakeWorld(World):
                 yaw_arm=self.scene.yaw_arm,
             )
 
-    def reset(self, ids: Indices, joint_position: Array, pitch: Array, yaw: Array, drawn: Mapping[str, Array]) -> None:
-        super().reset(ids, joint_position, pitch, yaw, drawn)
+    def reset(self, ids: Indices, joint_position: Array, pitch: Array, drawn: Mapping[str, Array]) -> None:
+        super().reset(ids, joint_position, pitch, drawn)
         self._lag[ids] = np.round(drawn["action_latency"] * self._steps.substeps)
         self._targets[ids] = self.control[ids, None]
         self._build(ids)

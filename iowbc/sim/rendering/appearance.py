@@ -10,12 +10,9 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from iowbc.recipe.simulation.scene import Scene
-from iowbc.recipe.simulation.simulation import Physics
 from iowbc.robot.description import Robot
 from iowbc.sim.model import scene_spec
 from iowbc.sim.simulation import Simulation
-from iowbc.sim.timing import Timing
 
 LIGHT_PARTS = (0.80, 0.81, 0.83, 1.0)
 DARK_PARTS = (0.16, 0.17, 0.19, 1.0)
@@ -40,7 +37,13 @@ class Appearance:
 
     def __init__(self, simulation: Simulation, env: int) -> None:
         self._world, self._index = simulation.world_of(env)
-        self.model = dressed_model(simulation.robot, self._world.physics, self._world.scene, self._world.timing)
+        robot, world = simulation.robot, self._world
+        spec = scene_spec(robot, world.physics, world.scene, world.timing, dressed=True)
+        _add_visuals(spec)
+        meshes = list(installed_meshes(robot))
+        if meshes:
+            _replace_by_meshes(spec, robot, meshes)
+        self.model = spec.compile()
         self.data = mujoco.MjData(self.model)
         self.update()
 
@@ -54,16 +57,6 @@ class Appearance:
         mujoco.mj_comPos(self.model, data)
         mujoco.mj_camlight(self.model, data)
         return data
-
-
-def dressed_model(robot: Robot, physics: Physics, scene: Scene, timing: Timing) -> Any:
-    """Compiled model with the same positions and velocities as the stepped one, with visual geometry."""
-    spec = scene_spec(robot, physics, scene, timing, dressed=True)
-    _add_visuals(spec)
-    meshes = list(installed_meshes(robot))
-    if meshes:
-        _replace_by_meshes(spec, robot, meshes)
-    return spec.compile()
 
 
 def installed_meshes(robot: Robot) -> Iterator[Mesh]:

@@ -25,16 +25,14 @@ class Commander:
         scripts: Sequence[CommandScript | None],
         holding: Mask,
         pushing: Mask,
-        period: float,
     ) -> None:
         """`holding`: environments that begin with an object in the hands, `pushing`: with a crate in front, (n,)."""
         commands = task.commands
         self._nominal, self._start = nominal_command(commands), np.where(holding, commands.holding_start, 1.0)[:, None]
-        self._commands, self._curriculum, self._references, self._period = commands, task.curriculum, references, period
-        self._pushing = pushing
-        self._largest_step = rate_limits(commands.rates) * period
+        self._commands, self._curriculum, self._references = commands, task.curriculum, references
+        self._pushing, self._period = pushing, 1.0 / task.control_frequency
+        self._largest_step = rate_limits(commands.rates) * self._period
         self.scripted = np.array([script is not None for script in scripts])
-        self._drawn, self._any_script = ~self.scripted, bool(self.scripted.any())
         self._times, self._values = _knots(scripts)
         self._given: Array | None = None
 
@@ -42,7 +40,7 @@ class Commander:
         """Follow a user's commands, (11,) or (n, 11), in place of drawn and scripted ones; they may be
         changed in place. Episodes begin in their posture, standing."""
         self._given = wanted
-        self.scripted[:], self._drawn[:], self._any_script = True, False, True
+        self.scripted[:] = True
 
     def start(self, which: Indices, memory: EpisodeState, key: Keys) -> None:
         """First goals of new episodes; `key` (k,). Episodes with drawn commands start standing, in the goal's posture
@@ -63,10 +61,10 @@ class Commander:
 
     def advance(self, memory: EpisodeState, key: Keys) -> None:
         """Goals and commands of the next control step; `key` of the episodes, (n,)."""
-        due = np.flatnonzero((memory.steps >= memory.goal_until) & self._drawn)
+        due = np.flatnonzero((memory.steps >= memory.goal_until) & ~self.scripted)
         if len(due):
             self._draw(due, memory, key[due])
-        if self._any_script:
+        if self.scripted.any():
             memory.goal[self.scripted] = self._scripted(memory)[self.scripted]
         memory.command[...] = self._references.clamp(approach(memory.command, memory.goal, self._largest_step))
 

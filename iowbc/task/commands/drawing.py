@@ -1,23 +1,26 @@
 """Drawing commands in training: 11-D goals, and how long each is held."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from iowbc import counter_random as random
 from iowbc.arrays import Array, Keys, Mask
 from iowbc.control.command import COMMAND, PITCH
 from iowbc.recipe.task.commands import Commands
-from iowbc.task.curriculum import Difficulty
 
 
-def draw_goals(commands: Commands, key: Keys, difficulty: Difficulty, *, pushing: Mask, walking: Mask) -> Array:
-    """Goals (n, 11), a pure function of the keys (n,); ranges scaled by the difficulty.
+def draw_goals(
+    commands: Commands, key: Keys, difficulty: Mapping[str, Array], *, pushing: Mask, walking: Mask
+) -> Array:
+    """Goals (n, 11), a pure function of the keys (n,); ranges scaled by `iowbc.task.curriculum.difficulty`.
 
     pushing: environments with a crate in front of them, (n,); walking: those whose episode commands velocities, (n,).
     """
     goals = np.empty((len(key), len(COMMAND)))
     goals[:, :3] = _velocities(commands, key, difficulty, pushing) * walking[:, None]
-    goals[:, 3:] = _posture(commands, key, difficulty.posture)
-    deep = _deep_pitch(commands, key, difficulty.posture) * ~goals[:, :3].any(axis=1)
+    goals[:, 3:] = _posture(commands, key, difficulty["posture"])
+    deep = _deep_pitch(commands, key, difficulty["posture"]) * ~goals[:, :3].any(axis=1)
     goals[:, PITCH] = np.where(deep != 0.0, deep, goals[:, PITCH])
     return goals
 
@@ -28,15 +31,15 @@ def draw_holding_time(commands: Commands, key: Keys) -> Array:
     return low + (high - low) * random.uniform(key, "command/time", 1)[:, 0]
 
 
-def _velocities(commands: Commands, key: Keys, difficulty: Difficulty, pushing: Mask) -> Array:
+def _velocities(commands: Commands, key: Keys, difficulty: Mapping[str, Array], pushing: Mask) -> Array:
     """v_x, v_y, ω ~ U(range)·scale: a share is zero, straight or turning on the spot; low speeds are raised."""
     u = random.uniform(key, "command/velocity", 6)
     ranges = np.array([commands.velocity_x, commands.velocity_y, commands.yaw_rate])
     behind = np.array([commands.pushing.velocity_x, commands.pushing.velocity_y, commands.pushing.yaw_rate])
     low, high = np.where(pushing[:, None], behind.T[:, None], ranges.T[:, None])
     velocity = low + (high - low) * u[:, :3]
-    velocity[:, 0] *= difficulty.velocity
-    velocity[:, 1:] *= difficulty.turning[:, None]
+    velocity[:, 0] *= difficulty["velocity"]
+    velocity[:, 1:] *= difficulty["turning"][:, None]
     velocity[:, 1:] *= (u[:, 3] >= commands.straight_share)[:, None]
     on_the_spot = (u[:, 4] < commands.turning_share) & (u[:, 3] >= commands.straight_share) & ~pushing
     velocity[on_the_spot, :2] = 0.0

@@ -66,9 +66,4 @@ class CommandScript:
 
     @classmethod
     def from_json(cls, segments: Sequence[Mapping[str, Any]]) -> "CommandScript":
-        return cls(
-            tuple(
-                CommandSegment(float(s["duration"]), tuple(map(float, s["command"])), float(s["ramp"]))
-                for s in segments
-            )
-        )
+        return cls(tuple(CommandSegment(s["duration"], tuple(s["command"]), s["ramp"]) for s in segments))

@@ -98,7 +98,7 @@ def count_step(buffers: Buffers, judgement: Judgement, memory: EpisodeState) -> 
     buffers["terms"][:] += scored.terms
     counters[:, COLUMN["steps"]] += 1.0
     counters[:, COLUMN["tracking"]] += scored.tracking.sum(axis=1) / scored.tracking.shape[1]
-    moved, command = judgement.motion, judgement.command
+    moved, command = judgement.motion, memory.command
     errors = np.empty((len(command), 1 + len(ERRORS)))
     errors[:, 0] = 1.0
     away = memory.filtered_velocity[:, :YAW_RATE] - command[:, :YAW_RATE]

@@ -62,17 +62,14 @@ class RewardFunction:
         execute the user-defined terms, which are zero otherwise. Raises StageFailed for one that cannot be used."""
         table = TERMS if terms is None else terms
         self._columns = len(table) + len(recipe.own_terms)
-        seconds = {path: 1.0 if path in ONCE else period for path in table}
-        seconds |= {path: 0.0 for path in table if path.partition(".")[0] in recipe.without}
+        seconds = dict.fromkeys(ONCE, 1.0) | {path: 0.0 for path in table if path.partition(".")[0] in recipe.without}
+        functions = {**table, **(load_terms(recipe) if own else {})}
+        settings = {path: attrgetter(path)(recipe) for path in table}
+        settings |= {f"own.{name}": term for name, term in recipe.own_terms.items()}
         weighted = {
-            path: _weighted(column, function, attrgetter(path)(recipe), seconds[path])
-            for column, (path, function) in enumerate(table.items())
+            path: _weighted(column, function, settings[path], seconds.get(path, period))
+            for column, (path, function) in enumerate(functions.items())
         }
-        if own:
-            for column, (name, function) in enumerate(load_terms(recipe).items(), len(table)):
-                term = recipe.own[name]
-                setting = term.weight if term.width is None else Kernel(weight=term.weight, width=term.width)
-                weighted[f"own.{name}"] = _weighted(column, function, setting, period)
         self._terms = [term for path, term in weighted.items() if term.weight != 0.0 or path in TRACKED]
         self._tracked = [weighted[path].column for path in TRACKED]
         self._once = [weighted[path].column for path in ONCE]
@@ -81,7 +78,7 @@ class RewardFunction:
         self._later = recipe.later
         for path, weight in (recipe.later.weights if recipe.later else {}).items():
             changed = weighted[path]
-            self._change[changed.column] = weight * seconds[path] - changed.weight
+            self._change[changed.column] = weight * seconds.get(path, period) - changed.weight
             if changed not in self._terms:
                 self._terms.append(changed)
 
@@ -103,8 +100,8 @@ class RewardFunction:
         return RewardResult(reward=terms.sum(axis=1), terms=terms, tracking=tracking)
 
 
-def _weighted(column: int, function: Term, setting: float | Kernel, seconds: float) -> WeightedTerm:
-    if isinstance(setting, Kernel):
+def _weighted(column: int, function: Term, setting: float | Kernel | CustomTerm, seconds: float) -> WeightedTerm:
+    if isinstance(setting, Kernel | CustomTerm):
         return WeightedTerm(column, function, setting.weight * seconds, setting.width)
     return WeightedTerm(column, function, setting * seconds, None)
 
@@ -115,13 +112,13 @@ def kernel(squared_error: Array, width: float | Array) -> Array:
 
 
 def load_terms(recipe: Reward) -> dict[str, Callable[[Step], Array]]:
-    """User-defined terms that have a weight, by name; only training environments execute their file. Raises StageFailed
-    for one that cannot be used."""
-    return {name: _own_term(name, term) for name, term in recipe.own_terms.items()}
+    """User-defined terms that have a weight, by dotted path; only training environments execute their file. Raises
+    StageFailed for one that cannot be used."""
+    return {f"own.{name}": _own_term(f"task.reward.own.{name}", term) for name, term in recipe.own_terms.items()}
 
 
-def _own_term(name: str, term: CustomTerm) -> Callable[[Step], Array]:
-    function = load_function(f"task.reward.own.{name}", term, CONTRACT)
+def _own_term(path: str, term: CustomTerm) -> Callable[[Step], Array]:
+    function = load_function(path, term, CONTRACT)
 
     def value(step: Step) -> Array:
         count = len(step.command)

@@ -8,10 +8,10 @@ import pickle
 import signal
 import sys
 import traceback
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass
 from multiprocessing.connection import Connection
-from typing import Any, Concatenate, ParamSpec, Self
+from typing import Any, Self, TypeVarTuple
 
 from iowbc.errors import IowbcError
 from iowbc.processes import die_with_parent
@@ -20,8 +20,7 @@ ASKED = "import json, sys; sys.path[:] = json.loads(sys.argv.pop(1)); from iowbc
 """Python program of a worker process. Its arguments are the parent's module path, as JSON, and its process id; whether
 to die with the thread that started the worker; and the descriptors of pipe, shared memory and log."""
 
-
-Given = ParamSpec("Given")
+Given = TypeVarTuple("Given")
 
 
 @dataclass(frozen=True)
@@ -30,18 +29,17 @@ class Message:
 
     method: Callable[..., Any]
     arguments: tuple[Any, ...] = ()
-    named: Mapping[str, Any] = field(default_factory=dict)
     changes: bool = True
     """True if the call changes the environments' state."""
 
     @classmethod
-    def of(cls, method: Callable[Concatenate[Any, Given], Any], *arguments: Given.args, **named: Given.kwargs) -> Self:
+    def of(cls, method: Callable[[Any, *Given], Any], *arguments: *Given) -> Self:
         """A call that changes the environments, of a method of their class."""
-        return cls(method, arguments, named)
+        return cls(method, arguments)
 
     def carry_out(self, batch: Any) -> Any:
         """Executes the call for a group of environments."""
-        return self.method(batch, *self.arguments, **self.named)
+        return self.method(batch, *self.arguments)
 
 
 def main() -> None:
