@@ -12,7 +12,7 @@ from rich.console import Console
 from iowbc.commands import completion, options
 from iowbc.commands.diff import difference_lines
 from iowbc.commands.lookup import FILM, film_of, members_of, named, points_of, record_comparison
-from iowbc.commands.printed import filming, print_json, shown_path, stdout_console, tell
+from iowbc.commands.printed import film_progress, print_json, shown_path, stdout_console, tell
 from iowbc.commands.results import PROBE, TRIALS, evaluated_actor, split_tables, tables_of
 from iowbc.errors import UsageError
 from iowbc.pipeline.console.live_table import sparkline
@@ -304,9 +304,9 @@ def _film(store: Store, console: Console, tried: Sequence[Run], path: Path, quie
         for run, table in zip(tried, _with_unique_labels(tried, TRIALS)[0], strict=True)
         if len(first) == 1 or run.label in first
     ]
-    with filming(console, None if quiet else path) as progress:
-        actors = [evaluated_actor(store, artifact, table) for artifact, table in chosen]
-        rows = common_trial(actors)
-        if not rows:
-            raise UsageError("the runs share no trial to film: their evaluations have no suite and mass in common")
-        film_side_by_side(actors, rows, path, progress=progress)
+    progress = film_progress(console, None if quiet else path)
+    actors = [evaluated_actor(store, artifact, table) for artifact, table in chosen]
+    rows = common_trial(actors)
+    if not rows:
+        raise UsageError("the runs share no trial to film: their evaluations have no suite and mass in common")
+    film_side_by_side(actors, rows, path, progress=progress)

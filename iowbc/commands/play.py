@@ -20,7 +20,7 @@ from iowbc.commands.lookup import (
     policy_stages,
     world_of,
 )
-from iowbc.commands.printed import filming, stdout_console, tell
+from iowbc.commands.printed import film_progress, stdout_console, tell
 from iowbc.commands.process import close_on_termination
 from iowbc.commands.request import prepared
 from iowbc.commands.results import evaluated_actor
@@ -95,8 +95,8 @@ def play(
     from iowbc.evaluation.play import play as play_episode
 
     try:
-        with filming(console, request.video) as progress:
-            episode, outcome, pictures = play_episode(source, request, progress=progress)
+        progress = film_progress(console, request.video)
+        episode, outcome, pictures = play_episode(source, request, progress=progress)
     except Interrupted as stopped:
         console.print(str(stopped), markup=False, highlight=False)
         return
