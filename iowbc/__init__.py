@@ -11,30 +11,19 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
-    from iowbc.commands.lookup import open_artifact
-    from iowbc.control.sensors import Measured
-    from iowbc.deploy.controller import Controller, Targets
-    from iowbc.errors import IowbcError
-    from iowbc.pipeline.store.artifact import Artifact
-    from iowbc.recipe.reading.loading import load_recipe
-    from iowbc.recipe.recipe import Recipe
-    from iowbc.task.vector.vector_env import VectorEnv
+    from iowbc.commands.lookup import open_artifact as open_artifact
+    from iowbc.control.sensors import Measured as Measured
+    from iowbc.deploy.controller import Controller as Controller
+    from iowbc.deploy.controller import Targets as Targets
+    from iowbc.errors import IowbcError as IowbcError
+    from iowbc.pipeline.store.artifact import Artifact as Artifact
+    from iowbc.recipe.reading.loading import load_recipe as load_recipe
+    from iowbc.recipe.recipe import Recipe as Recipe
+    from iowbc.task.vector.vector_env import VectorEnv as VectorEnv
 
 os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")  # read when onnxruntime is imported; it sends telemetry otherwise
 
 __version__ = "0.2.0"
-__all__ = [
-    "Artifact",
-    "Controller",
-    "IowbcError",
-    "Measured",
-    "Recipe",
-    "Targets",
-    "VectorEnv",
-    "load_recipe",
-    "open_artifact",
-]
-
 _PLACES = {
     "Artifact": "iowbc.pipeline.store.artifact",
     "Controller": "iowbc.deploy.controller",
@@ -46,6 +35,7 @@ _PLACES = {
     "load_recipe": "iowbc.recipe.reading.loading",
     "open_artifact": "iowbc.commands.lookup",
 }
+__all__ = [*_PLACES]
 
 
 def __getattr__(name: str) -> "Any":

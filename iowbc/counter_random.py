@@ -14,20 +14,17 @@ from iowbc.arrays import Array, Keys
 from iowbc.recipe.simulation.randomization import Distribution
 
 GOLDEN = np.uint64(0x9E3779B97F4A7C15)
-FIRST, SECOND = np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB)
-THIRTY, TWENTY_SEVEN, THIRTY_ONE = np.uint64(30), np.uint64(27), np.uint64(31)
-MANTISSA_SHIFT = np.uint64(11)
 UNIT = 2.0**-53
 
 
 def mix(value: Keys) -> Keys:
     """SplitMix64's output function (Steele, Lea, Flood 2014) of value + golden ratio: a scattering bijection."""
     z = value + GOLDEN
-    z ^= z >> THIRTY
-    z *= FIRST
-    z ^= z >> TWENTY_SEVEN
-    z *= SECOND
-    z ^= z >> THIRTY_ONE
+    z ^= z >> 30
+    z *= 0xBF58476D1CE4E5B9
+    z ^= z >> 27
+    z *= 0x94D049BB133111EB
+    z ^= z >> 31
     return z
 
 
@@ -60,7 +57,7 @@ def bits(key: Keys, stream: str, width: int) -> Keys:
 
 def uniform(key: Keys, stream: str, width: int) -> Array:
     """x ~ U[0, 1), shape (n, width)."""
-    unit: Array = (bits(key, stream, width) >> MANTISSA_SHIFT) * UNIT
+    unit: Array = (bits(key, stream, width) >> 11) * UNIT
     return unit
 
 
@@ -81,7 +78,6 @@ def draw(key: Keys, stream: str, distribution: Distribution, width: int = 1) -> 
 
 BYTES = np.uint64(0x00FF00FF00FF00FF)
 PAIRS = np.uint64(0x0000FFFF0000FFFF)
-EIGHT, SIXTEEN = np.uint64(8), np.uint64(16)
 STEP = np.uint64(0xD1342543DE82EF95)
 BYTE_MEAN, BYTE_VARIANCE = 127.5, (256.0**2 - 1.0) / 12.0
 
@@ -93,10 +89,10 @@ def noise(key: Keys, step: NDArray[np.uint64], width: int) -> Array:
     """
     word = mix((key + step * STEP)[:, None] + _lanes(width // 2))
     sums = word & BYTES
-    word >>= EIGHT
+    word >>= 8
     word &= BYTES
     sums += word
-    np.right_shift(sums, SIXTEEN, out=word)
+    np.right_shift(sums, 16, out=word)
     sums &= PAIRS
     word &= PAIRS
     sums += word

@@ -2,15 +2,15 @@
 
 IowbcError              a command that raises one prints its text and ends with 1
 ├── UsageError          what was asked for cannot be done (2)
-│   └── RecipeError     a recipe or an override is wrong; holds every problem found
+│   ├── RecipeError     a recipe or an override is wrong; holds every problem found
+│   ├── ContractBroken  an exported folder is incomplete, damaged, or of another format
+│   ├── NoRenderer      nothing can be drawn on this machine
+│   └── NoDisplay       the viewer needs a display and there is none
 ├── StageFailed         a stage's result misses a gate or could not be made
 ├── PipelineFailed      a run ended at a failed stage
 ├── Interrupted         asked to stop; what was done is kept (130)
 ├── Damaged             a file or an artifact is not what was written
-├── ContractBroken      an exported folder is incomplete, damaged, or of another format (2)
 ├── WorkerFailed        a worker process died, hung, or raised
-├── NoRenderer          nothing can be drawn on this machine (2)
-├── NoDisplay           the viewer needs a display and there is none (2)
 └── Rejected            a sample of the reference generator has no label
 """
 
@@ -76,26 +76,20 @@ class Damaged(IowbcError):
     """A file or an artifact is not what was written. The text says how."""
 
 
-class ContractBroken(IowbcError):
+class ContractBroken(UsageError):
     """An exported folder is incomplete, damaged, or of another format. The text says what to do."""
-
-    exit_code = 2
 
 
 class WorkerFailed(IowbcError):
     """A worker process died, hung, or raised; the text holds its traceback, if it left one. All have ended by then."""
 
 
-class NoRenderer(IowbcError):
+class NoRenderer(UsageError):
     """Nothing can be drawn on this machine. The text says what to install."""
 
-    exit_code = 2
 
-
-class NoDisplay(IowbcError):
+class NoDisplay(UsageError):
     """The viewer needs a display and there is none. The text says what to do instead."""
-
-    exit_code = 2
 
 
 class Rejected(IowbcError):

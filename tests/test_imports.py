@@ -31,7 +31,7 @@ MAY_IMPORT = {
     "sim": SHARED,
     "reference": WORLD | {"results"},
     "model_based": SHARED | {"reference"},
-    "adapters": SHARED | {"task"},
+    "adapters": SHARED | {"task", "deploy"},
     "rollouts": {"arrays"},
     "learning": SHARED | {"rollouts", "results"},
     "twin": WORLD | {"onboard"},

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from iowbc.arrays import Array
+from iowbc.deploy.controller import open_session
 from iowbc.errors import StageFailed
 
 TORCHSCRIPT = (".pt", ".pth", ".jit", ".ts")
@@ -29,22 +30,14 @@ def network(path: Path) -> Callable[..., Array]:
 def metadata(path: Path) -> Mapping[str, Any]:
     """Metadata of an ONNX file, with values decoded from JSON. Raises StageFailed."""
     try:
-        said = _session(path).get_modelmeta().custom_metadata_map
+        said = open_session(path).get_modelmeta().custom_metadata_map
         return {name: json.loads(value) for name, value in said.items()}
     except Exception as error:
         raise StageFailed(f"{path}: its metadata cannot be read: {error}") from error
 
 
-def _session(path: Path) -> Any:
-    import onnxruntime
-
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = options.inter_op_num_threads = 1
-    return onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
-
-
 def _onnx(path: Path) -> Callable[..., Array]:
-    session = _session(path)
+    session = open_session(path)
     names = [one.name for one in session.get_inputs()]
 
     def run(*inputs: Array) -> Array:

@@ -17,24 +17,17 @@ PARTS = ("physics", "simulation", "references", "reward", "observation", "rest")
 observations; signals, counters and the like."""
 
 
-class Stopwatch:
-    """Accumulates the CPU time of methods in this thread, which excludes other programs."""
+def _watch(spent: dict[str, float], owner: Any, name: str, label: str) -> None:
+    """From now on a method adds its CPU time in this thread, which excludes other programs, to `spent`."""
+    method: Callable[..., Any] = getattr(owner, name)
 
-    def __init__(self) -> None:
-        self.spent: dict[str, float] = {}
+    def timed(*arguments: Any, **options: Any) -> Any:
+        begin = time.thread_time()
+        found = method(*arguments, **options)
+        spent[label] += time.thread_time() - begin
+        return found
 
-    def watch(self, owner: Any, name: str, label: str) -> None:
-        method: Callable[..., Any] = getattr(owner, name)
-        self.spent.setdefault(label, 0.0)
-
-        def timed(*arguments: Any, **options: Any) -> Any:
-            begin = time.thread_time()
-            try:
-                return method(*arguments, **options)
-            finally:
-                self.spent[label] += time.thread_time() - begin
-
-        setattr(owner, name, timed)
+    setattr(owner, name, timed)
 
 
 class _BatchWrapper:
@@ -53,25 +46,24 @@ def step_breakdown(setup: Setup, periods: int, rounds: int) -> dict[str, float]:
     Also `reset`: additional time at the end of an episode.
     """
     workers = InProcess(setup)
-    batch, watch = workers.batch, Stopwatch()
-    watch.watch(batch, "step", "step")
+    batch, spent = workers.batch, dict.fromkeys(("step", *PARTS[:-1]), 0.0)
+    _watch(spent, batch, "step", "step")
     for world in batch.simulation.worlds:
         world.batch = _BatchWrapper(world.batch)
-        watch.watch(world.batch, "step", "physics")
-        watch.watch(world.batch, "forward", "physics")
-    watch.watch(batch.simulation, "step", "simulation")
-    watch.watch(batch.guidance, "advance", "references")
-    watch.watch(batch.judge, "judge", "reward")
-    watch.watch(batch, "_observe", "observation")
+        _watch(spent, world.batch, "step", "physics")
+        _watch(spent, world.batch, "forward", "physics")
+    _watch(spent, batch.simulation, "step", "simulation")
+    _watch(spent, batch.guidance, "advance", "references")
+    _watch(spent, batch.judge, "judge", "reward")
+    _watch(spent, batch, "_observe", "observation")
     rows: list[dict[str, float]] = []
     for _ in range(rounds):
         batch.reset()
-        for name in watch.spent:
-            watch.spent[name] = 0.0
+        spent.update(dict.fromkeys(spent, 0.0))
         for period in range(periods):
             workers.buffers["action"][:] = random_actions(period, batch.n, workers.buffers["action"].shape[1])
             batch.step()
-        row = {name: 1e3 * spent / periods for name, spent in watch.spent.items()}
+        row = {name: 1e3 * seconds / periods for name, seconds in spent.items()}
         row["simulation"] -= row["physics"]
         row["rest"] = row.pop("step") - sum(row.values())
         rows.append(row)

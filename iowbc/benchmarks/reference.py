@@ -20,19 +20,13 @@ SAMPLES = {"static": (2048, 32), "ocp": (64, 2)}
 """Samples per worker by method, and samples per shard: few, so that workers are busy until the end."""
 
 
-def main(
-    recipe: Recipe | None = None,
-    *,
-    workers: Sequence[int] = (),
-    turns: int = 3,
-) -> dict[str, float]:
+def main(recipe: Recipe, *, workers: Sequence[int] = (), turns: int = 3) -> dict[str, float]:
     """Measures, prints the table, returns every rate by name (kept labels a second).
 
     `workers`: counts to measure, by default 1, 2 and the number of cores. All counts are measured `turns` times,
     alternately; the best repetition counts, as the least disturbed one. The start of the processes is left out. Rates
     "a core" are per CPU time: the rate of a core that no other program uses.
     """
-    recipe = recipe or Recipe(name="bench")
     folder = robot_folder(recipe.robot)
     cores = available_cores()
     counts = sorted(set(workers) or {1, 2, cores})

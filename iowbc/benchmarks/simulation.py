@@ -27,7 +27,7 @@ EPISODE = 10.0
 
 
 def main(
-    recipe: Recipe | None = None,
+    recipe: Recipe,
     *,
     scene: str = "lift",
     environments: int = 48,

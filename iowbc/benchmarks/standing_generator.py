@@ -48,9 +48,8 @@ def generator_of(robot: Path, recipe: Recipe) -> Iterator[Path]:
 
 
 @contextmanager
-def benchmark_world(recipe: Recipe | None, scene: str) -> Iterator[Specification]:
-    """The world of a recipe, or of the default one, with a single scene and a stand-in for the generator."""
-    recipe = recipe or Recipe(name="bench")
+def benchmark_world(recipe: Recipe, scene: str) -> Iterator[Specification]:
+    """The world of a recipe with a single scene and a stand-in for the generator."""
     only = {"task": recipe.task.model_copy(update={"scenes": SceneShares.only(scene)})}
     recipe, folder = recipe.model_copy(update=only), robot_folder(recipe.robot)
     with generator_of(folder, recipe) as generator:

@@ -26,13 +26,7 @@ PARTS = ("simulation", "inference", "learning", "rest")
 """Parts of an update: waiting for environments, inference, gradient steps with their preparation, and the rest."""
 
 
-def main(
-    recipe: Recipe | None = None,
-    *,
-    scene: str = "lift",
-    turns: int = 6,
-    others: int | None = None,
-) -> dict[str, float]:
+def main(recipe: Recipe, *, scene: str = "lift", turns: int = 6, others: int | None = None) -> dict[str, float]:
     """Measures, prints a table, returns every figure by name (rates in environment steps a second, times in s).
 
     Both trainings alternate, with equally many samples, epochs and minibatches per update and networks of one size.

@@ -12,7 +12,7 @@ from iowbc.pipeline.store.runs import Runs, require_writable_runs
 from iowbc.pipeline.tracking.tracker import record_figures
 from iowbc.recipe.reading.loading import load_recipe
 from iowbc.recipe.recipe import Recipe
-from iowbc.recipe.simulation.holding import SCENES
+from iowbc.recipe.simulation.holding import FREE
 from iowbc.robot.description import robot_folder
 
 BenchRecipe = Annotated[Path | None, typer.Argument(help="Recipe file (default: built-in values).", metavar="RECIPE")]
@@ -87,12 +87,11 @@ def engines(
         raise IowbcError(f"the engines differ by more than expected: {', '.join(differing)}")
 
 
-def _checked(runs: Path, file: Path | None, scene: str | None = None) -> Recipe | None:
-    """The recipe in a file, once everything that a benchmark needs is there; None for the default one. Raises
-    `UsageError`, also for a scene that it does not have."""
-    recipe = load_recipe(file).recipe if file is not None else None
-    if scene is not None:
-        require_known(scene, "scene", SCENES if recipe is None else recipe.simulation.scenes.names)
+def _checked(runs: Path, file: Path | None, scene: str = FREE) -> Recipe:
+    """The recipe in a file, or the default one, once everything that a benchmark needs is there. Raises `UsageError`,
+    also for a scene that it does not have."""
+    recipe = load_recipe(file).recipe if file is not None else Recipe(name="bench")
+    require_known(scene, "scene", recipe.simulation.scenes.names)
     options.require_extra("train", "iowbc bench")
     require_writable_runs(Runs(runs))
     return recipe

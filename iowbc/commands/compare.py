@@ -12,11 +12,12 @@ from rich.console import Console
 from iowbc.commands import completion, options
 from iowbc.commands.diff import difference_lines
 from iowbc.commands.lookup import FILM, film_of, members_of, named, points_of, record_comparison
-from iowbc.commands.printed import filming, print_json, shown_path, stdout_console, tell
+from iowbc.commands.printed import film_progress, print_json, shown_path, stdout_console, tell
 from iowbc.commands.results import PROBE, TRIALS, evaluated_actor, split_tables, tables_of
 from iowbc.errors import UsageError
 from iowbc.pipeline.console.live_table import sparkline
 from iowbc.pipeline.console.wording import size
+from iowbc.pipeline.nested import flattened
 from iowbc.pipeline.store.last_used import require_whole
 from iowbc.pipeline.store.runs import Runs, require_writable
 from iowbc.pipeline.store.store import Store
@@ -106,7 +107,7 @@ def report(
     """Write one self-contained HTML file about runs, readable offline. Raises `UsageError`."""
     store, console = Store(Runs(runs)), stdout_console()
     if log is not None:
-        from iowbc.commands.robot_log import report_log
+        from iowbc.commands.robot import report_log
 
         report_log(console, words[0], log, output or log.with_suffix(".png"))
         return
@@ -251,14 +252,15 @@ def trainings_table(groups: Sequence[Group], missing: Sequence[str] = ()) -> Tab
     used = {stage for group in groups for run in group.runs for stage in run.recipe.get("stages", ())}
     named = [STAGES[name] for name in STAGES if name in used | {"teacher", "distill"}]
     methods = {stage.name: stage.presentation.trained_by for stage in named if stage.presentation.trained_by}
-    rows: list[tuple[str, ...]] = []
-    numbers: list[dict[str, object]] = []
-    for group in groups:
-        for run, seed in zip(group.runs, group.seeds, strict=True):
-            steps = {stage: _steps_of(run, stage) for stage in methods}
-            label = str(run.recipe["eval"]["label"])
-            rows.append((run.label, label, seed, *(ABSENT if n is None else f"{n:,}" for n in steps.values())))
-            numbers.append({"recipe": run.label, "algorithm": label, "seed": seed, **steps})
+    numbers = [
+        {"recipe": run.label, "algorithm": str(run.recipe["eval"]["label"]), "seed": seed}
+        | {stage: _steps_of(run, stage) for stage in methods}
+        for group in groups
+        for run, seed in zip(group.runs, group.seeds, strict=True)
+    ]
+    rows = [
+        tuple(ABSENT if n is None else f"{n:,}" if isinstance(n, int) else n for n in one.values()) for one in numbers
+    ]
     rows += [(name, NOT_TRAINED, *[ABSENT] * (1 + len(methods))) for name in missing]
     columns = heads("Recipe", "Algorithm", "Seed", *(f"Steps of {method}" for method in methods.values()))
     budget = "" if len({row["teacher"] for row in numbers}) == 1 else "not "
@@ -271,11 +273,9 @@ def _steps_of(run: Run, stage: str) -> int | None:
     """Environment steps of a stage that trains; None where the run has no such stage."""
     if stage not in run.recipe.get("stages", ()):
         return None
-    made: Any = run.artifacts[stage].recipe if stage in run.artifacts else run.recipe
+    made = run.artifacts[stage].recipe if stage in run.artifacts else run.recipe
     (counted, *_) = STAGES[stage].counts or (f"{stage}.steps",)
-    for part in counted.split("."):
-        made = made[part]
-    return int(made)
+    return int(flattened(made)[counted])
 
 
 def film_joint(store: Store, console: Console, words: Sequence[str], output: Path) -> Path | None:
@@ -304,9 +304,9 @@ def _film(store: Store, console: Console, tried: Sequence[Run], path: Path, quie
         for run, table in zip(tried, _with_unique_labels(tried, TRIALS)[0], strict=True)
         if len(first) == 1 or run.label in first
     ]
-    with filming(console, None if quiet else path) as progress:
-        actors = [evaluated_actor(store, artifact, table) for artifact, table in chosen]
-        rows = common_trial(actors)
-        if not rows:
-            raise UsageError("the runs share no trial to film: their evaluations have no suite and mass in common")
-        film_side_by_side(actors, rows, path, progress=progress)
+    progress = film_progress(console, None if quiet else path)
+    actors = [evaluated_actor(store, artifact, table) for artifact, table in chosen]
+    rows = common_trial(actors)
+    if not rows:
+        raise UsageError("the runs share no trial to film: their evaluations have no suite and mass in common")
+    film_side_by_side(actors, rows, path, progress=progress)

@@ -22,9 +22,6 @@ from iowbc.recipe.reading.loading import SUFFIXES, load_recipe, recipe_file
 from iowbc.recipe.recipe import Recipe
 from iowbc.report.runs import Run
 
-ABSENT = "(absent)"
-"""Shown for a value that one of the two lacks."""
-
 
 def diff(
     first: options.Named,
@@ -85,7 +82,7 @@ def _of_artifacts(old: Artifact, new: Artifact, with_recipe: bool) -> Iterator[s
     if with_recipe:
         yield from _changes("", old.ingredients.get("recipe", {}), new.ingredients.get("recipe", {}))
     for name, *digests in differences(old.ingredients.get("inputs", {}), new.ingredients.get("inputs", {})):
-        yield f"input {name}: {' -> '.join(ABSENT if one is MISSING else str(one)[:KEY_LENGTH] for one in digests)}"
+        yield f"input {name}: {' -> '.join(str(digest)[:KEY_LENGTH] for digest in digests)}"
     if before.version != after.version:
         yield f"stage version: {before.version} -> {after.version}"
     yield from _changes("version of ", before.versions, after.versions)
@@ -94,11 +91,11 @@ def _of_artifacts(old: Artifact, new: Artifact, with_recipe: bool) -> Iterator[s
     for name in dict.fromkeys([*old.metrics, *new.metrics]):
         first, second = old.metrics.get(name), new.metrics.get(name)
         if first != second:
-            values = " -> ".join(ABSENT if value is None else figure(value, 6) for value in (first, second))
+            values = " -> ".join(str(MISSING) if value is None else figure(value, 6) for value in (first, second))
             step = f" ({figure(second - first, 3, '+')})" if first is not None and second is not None else ""
             yield f"metric {name}: {values}{step}"
 
 
 def _changes(prefix: str, before: Mapping[str, Any], after: Mapping[str, Any]) -> Iterator[str]:
     for path, *values in differences(nested(before), nested(after)):
-        yield f"{prefix}{path}: {' -> '.join(ABSENT if value is MISSING else shown(value) for value in values)}"
+        yield f"{prefix}{path}: {' -> '.join(map(shown, values))}"

@@ -7,19 +7,19 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
+import psutil
 import typer
 from packaging.requirements import Requirement
-from packaging.specifiers import SpecifierSet
-from rich.table import Table
 from rich.text import Text
 
 from iowbc.commands import options
-from iowbc.commands.printed import stdout_console
+from iowbc.commands.printed import plain_table, stdout_console
 from iowbc.pipeline.console.wording import duration
 from iowbc.pipeline.store.runs import Runs, obstacle
+from iowbc.pipeline.tracking.delivery import tracking_uri
+from iowbc.pipeline.tracking.tracker import backlog
 from iowbc.processes import available_cores
 
 Verdict = Literal["good", "doubtful", "bad"]
@@ -52,22 +52,17 @@ assert numpy.isfinite(made.Jc).all() and abs(made.Jc).sum() > 0
 """Computes a contact of a free body; mismatched binaries of crocoddyl and pinocchio crash here."""
 
 PICTURE = """
-from iowbc.sim.rendering import backend as headless
-chosen = headless.backend()
-context = headless.context(64, 64)
-import mujoco
-model = mujoco.MjModel.from_xml_string("<mujoco><worldbody><light pos='0 0 3'/><geom size='1'/></worldbody></mujoco>")
-data = mujoco.MjData(model)
-mujoco.mj_forward(model, data)
-renderer = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
-context.free()
-print(chosen)
+from iowbc.sim.rendering.backend import backend
+from iowbc.sim.rendering.offscreen import Offscreen, mujoco
+model = mujoco.MjModel.from_xml_string("<mujoco/>")
+with Offscreen(model, width=64, height=64, distance=1.0, azimuth=0.0, elevation=0.0) as picture:
+    picture.draw(mujoco.MjData(model))
+print(backend())
 """
-"""Sets up off-screen rendering."""
+"""Draws a picture without a screen."""
 
 
-@dataclass(frozen=True)
-class Finding:
+class Finding(NamedTuple):
     """Result of one check."""
 
     name: str
@@ -78,13 +73,10 @@ class Finding:
 def doctor(runs: options.RunsFolder = options.RUNS) -> None:
     """Print all findings; exits with 1 where something essential fails, else 0."""
     console = stdout_console()
-    table = Table(box=None, padding=(0, 1), show_header=False)
-    table.add_column(no_wrap=True)
-    table.add_column(no_wrap=True)
-    table.add_column(overflow="fold")
+    table = plain_table("check", "", "found")
     found = list(findings(Runs(runs)))
-    for one in found:
-        table.add_row(one.name, Text(one.verdict, style=STYLES[one.verdict]), Text(one.text))
+    for name, verdict, text in found:
+        table.add_row(name, Text(verdict, style=STYLES[verdict]), Text(text))
     console.print(table)
     fit = all(one.verdict != "bad" for one in found)
     console.print("fit to run recipes" if fit else "not fit to run recipes: see the lines marked bad", highlight=False)
@@ -93,7 +85,7 @@ def doctor(runs: options.RunsFolder = options.RUNS) -> None:
 
 def findings(runs: Runs) -> Iterator[Finding]:
     """All findings, essential ones first."""
-    yield _python()
+    yield Finding("Python", "good", platform.python_version())
     yield from _packages()
     yield from _robots()
     yield _process(
@@ -107,15 +99,19 @@ def findings(runs: Runs) -> Iterator[Finding]:
     yield _process("pictures", PICTURE, "drawn without a screen by ", "doubtful", "none, and no films: {}")
     cores = available_cores()
     yield Finding("cores", "good" if cores > 1 else "doubtful", f"{cores} of {os.cpu_count()}")
-    yield _memory()
-    yield _disk(runs)
-    yield _tracking(runs)
-
-
-def _python() -> Finding:
-    version, wanted = platform.python_version(), importlib.metadata.metadata("iowbc")["Requires-Python"]
-    fits = SpecifierSet(wanted).contains(version, prereleases=True)
-    return Finding("Python", "good" if fits else "bad", version if fits else f"{version}; Python {wanted} is needed")
+    memory = psutil.virtual_memory()
+    scarce = memory.available < LEAST_MEMORY
+    text = f"{memory.available / 1e9:.1f} GB free of {memory.total / 1e9:.1f} GB"
+    yield Finding("memory", "doubtful" if scarce else "good", text + "; fewer --workers need less" * scarce)
+    if reason := obstacle(runs.root):
+        yield Finding("disk", "bad", f"{runs.root} cannot be written: {reason}; give another with --runs")
+    else:
+        free = shutil.disk_usage(runs.root).free
+        text = f"{free / 1e9:.1f} GB free in {runs.root.absolute()}"
+        yield Finding("disk", "good" if free > LEAST_DISK else "doubtful", text)
+    waiting = len(backlog(runs))
+    text = (tracking_uri() or str(runs.database)) + (f"; {waiting} runs are not sent whole yet" if waiting else "")
+    yield Finding("tracking", "doubtful" if waiting else "good", text)
 
 
 def _packages() -> Iterator[Finding]:
@@ -142,10 +138,7 @@ def _packages() -> Iterator[Finding]:
 def _robots() -> Iterator[Finding]:
     from iowbc.robot.description import load_robot, robot_folders
 
-    folders = robot_folders()
-    if not folders:
-        yield Finding("robot", "bad", "no description of any robot is there; install iowbc again")
-    for folder in folders.values():
+    for folder in robot_folders().values():
         try:
             robot = load_robot(folder)
         except (OSError, ValueError) as error:
@@ -166,29 +159,3 @@ def _process(name: str, script: str, good: str, worst: Verdict, trouble: str) ->
     last = (done.stderr.strip().splitlines()[-1:] or [""])[0]
     crash = f"it crashes (signal {-done.returncode})" if done.returncode < 0 else ""
     return Finding(name, worst, trouble.format(crash or last.partition("NoRenderer: ")[2] or last))
-
-
-def _memory() -> Finding:
-    import psutil
-
-    memory = psutil.virtual_memory()
-    text = f"{memory.available / 1e9:.1f} GB free of {memory.total / 1e9:.1f} GB"
-    scarce = memory.available < LEAST_MEMORY
-    return Finding("memory", "doubtful" if scarce else "good", text + "; fewer --workers need less" * scarce)
-
-
-def _disk(runs: Runs) -> Finding:
-    if reason := obstacle(runs.root):
-        return Finding("disk", "bad", f"{runs.root} cannot be written: {reason}; give another with --runs")
-    free = shutil.disk_usage(runs.root).free
-    text = f"{free / 1e9:.1f} GB free in {runs.root.absolute()}"
-    return Finding("disk", "good" if free > LEAST_DISK else "doubtful", text)
-
-
-def _tracking(runs: Runs) -> Finding:
-    from iowbc.pipeline.tracking.delivery import tracking_uri
-    from iowbc.pipeline.tracking.tracker import backlog
-
-    waiting = len(backlog(runs))
-    text = (tracking_uri() or str(runs.database)) + (f"; {waiting} runs are not sent whole yet" if waiting else "")
-    return Finding("tracking", "doubtful" if waiting else "good", text)

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from iowbc.commands import completion, options
-from iowbc.commands.lookup import named
+from iowbc.commands.play import playable
 from iowbc.commands.printed import shown_path, stdout_console, tell
 from iowbc.deploy.exported_folder import CONTRACT
 from iowbc.errors import UsageError
@@ -32,7 +32,7 @@ def export(
     """Write the web page of an exported controller, and print how to open it. Raises `UsageError`."""
     options.require_extra("train", "iowbc export")
     store = Store(Runs(runs))
-    exported = exported_folder(store, word)
+    exported = Path(word) if os.path.isfile(Path(word, CONTRACT)) else playable(store, word, "export").folder
     if folder.is_dir() and any(folder.iterdir()) and not (folder / "scenes.json").is_file():
         raise UsageError(f"--web {folder}: holds other files; give an empty folder, or one that this command has made")
     require_writable(folder, "--web")
@@ -45,16 +45,3 @@ def export(
     whole = sum(path.stat().st_size for path in folder.iterdir())
     say(f"{shown_path(folder)} ({size(whole)}): copy it to any web server; to look at it here:")
     say(f"python3 -m http.server --bind 127.0.0.1 --directory {shown_path(folder)} 8000")
-
-
-def exported_folder(store: Store, word: str) -> Path:
-    """The exported folder that a word names: a folder, a recipe, `RECIPE/export` or a key. Raises `UsageError`."""
-    if os.path.isfile(Path(word, CONTRACT)):
-        return Path(word)
-    found = named(store, word).usable
-    if "export" not in found:
-        raise UsageError(
-            f"{word}: no exported controller; finished: {', '.join(found) or 'none'}; "
-            "run a recipe that ends with `export`, or give the folder that it made"
-        )
-    return found["export"].folder

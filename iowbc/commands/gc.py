@@ -11,7 +11,7 @@ import typer
 from iowbc.commands import options
 from iowbc.commands.lookup import known_recipes, last_used
 from iowbc.commands.printed import shown_path, stdout_console, tell
-from iowbc.errors import UsageError, nearest
+from iowbc.errors import UsageError, require_known
 from iowbc.files import OLD
 from iowbc.pipeline.console.wording import size
 from iowbc.pipeline.store.last_used import ever_used, record_path, remove_dangling
@@ -63,8 +63,12 @@ def gc(
         count = sum(file.stat().st_size for file in (path, *path.rglob("*")) if file.is_file())
         total += count
         verb = "would remove" if dry_run else "removed"
-        if not dry_run:
-            _remove(path)
+        if path.is_dir() and not dry_run:
+            doomed = path.with_name(REMOVING + path.name.removeprefix(REMOVING))
+            path.rename(doomed)  # it disappears from its place at once, then its files
+            shutil.rmtree(doomed)
+        elif not dry_run:
+            path.unlink()
         tell(console, f"{verb} {shown_path(path)} ({size(count)})")
     if not dry_run:
         remove_dangling(store.runs)
@@ -76,10 +80,7 @@ def _to_remove(
 ) -> Iterator[Path]:
     runs, known = store.runs, known_recipes(store)
     for recipe in recipes:
-        if recipe not in known:
-            listing = ", ".join(known) or "none"
-            text = f"no such recipe has run; those that have: {listing}{nearest(recipe, known)}"
-            raise UsageError(f"--recipe {recipe}: {text}")
+        require_known(recipe, "recipe that has run", known)
     own = [artifact for artifact in store.artifacts() if not artifact.published]
     free = [artifact for artifact in own if not holder(runs, artifact.manifest.key)]
     if unused:
@@ -108,13 +109,3 @@ def _to_remove(
                     yield sent_path(path)
     if damaged:
         yield from runs.damaged.glob("*")
-
-
-def _remove(path: Path) -> None:
-    """A folder disappears from its place at once, then its files."""
-    if path.is_dir():
-        doomed = path.with_name(REMOVING + path.name.removeprefix(REMOVING))
-        path.rename(doomed)
-        shutil.rmtree(doomed)
-    else:
-        path.unlink()

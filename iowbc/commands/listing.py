@@ -13,7 +13,7 @@ from rich.text import Text
 
 from iowbc.commands import completion, options
 from iowbc.commands.lookup import known_recipes, last_used, named
-from iowbc.commands.printed import NARROW, artifact_data, plain_table, print_json, shown_path, stdout_console, tell
+from iowbc.commands.printed import artifact_data, plain_table, print_json, shown_path, stdout_console, tell
 from iowbc.errors import require_known, shown
 from iowbc.pipeline.console.live_table import sparkline
 from iowbc.pipeline.console.wording import KEY_LENGTH, ago, duration, figure, size
@@ -86,10 +86,6 @@ def _data(store: Store) -> dict[str, Any]:
     return {"unfinished": working, "recipes": recipes, "unsent": len(backlog(store.runs))}
 
 
-METRICS_SHOWN = 2
-"""Metrics of an artifact in its row; `show` has all."""
-
-
 def ls(
     stage: Annotated[
         str | None, typer.Argument(help="Only artifacts of this stage.", autocompletion=completion.stages)
@@ -109,13 +105,10 @@ def ls(
         found = [artifact_data(artifact) for artifact in store.artifacts(stage)]
         print_json(console, [data | {"used_by": users.get(data["key"], [])} for data in found])
         return
-    wide = console.width >= NARROW
-    table = plain_table("stage", "key", "used by", "made", "took", "size", *(["metrics"] if wide else []))
+    table = plain_table("stage", "key", "used by", "made", "took", "size")
     artifacts = store.artifacts(stage)
     for artifact in artifacts:
         manifest = artifact.manifest
-        metrics = [f"{name} {figure(value)}" for name, value in artifact.metrics.items()]
-        text = ", ".join([*metrics[:METRICS_SHOWN], *(["..."] if len(metrics) > METRICS_SHOWN else [])])
         table.add_row(
             manifest.stage,
             manifest.key[:KEY_LENGTH],
@@ -123,7 +116,6 @@ def ls(
             ago(manifest.made),
             duration(manifest.seconds),
             size(artifact.size),
-            *([Text(text)] if wide else []),
         )
     if artifacts:
         console.print(table)

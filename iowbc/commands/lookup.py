@@ -16,7 +16,7 @@ from iowbc.pipeline.store.last_used import recall
 from iowbc.pipeline.store.locks import holder
 from iowbc.pipeline.store.runs import Runs, read_json, read_yaml
 from iowbc.pipeline.store.store import Store
-from iowbc.pipeline.store.workspace import Progress, unfinished
+from iowbc.pipeline.store.workspace import unfinished
 from iowbc.recipe.reading.loading import SUFFIXES, load_recipe, recipe_file
 from iowbc.recipe.reading.study import load_study
 from iowbc.recipe.recipe import PIPELINE, Recipe
@@ -196,13 +196,10 @@ def in_training(store: Store, word: str, stage: str | None) -> UnfinishedTrainin
     name, wanted = (name, last) if slash else (word, stage)
     if wanted not in STAGES or not STAGES[wanted].presentation.trained_by:
         return None
-    for folder, record in unfinished(store.runs):
-        if (record.stage, record.recipe) == (wanted, Path(name).stem):
-            return _training(store, folder, record)
-    return None
-
-
-def _training(store: Store, folder: Path, record: Progress) -> UnfinishedTraining:
+    own = [one for one in unfinished(store.runs) if (one[1].stage, one[1].recipe) == (wanted, Path(name).stem)]
+    if not own:
+        return None
+    folder, record = own[0]
     checkpoint, ingredients, recipe = folder / CHECKPOINT, read_json(folder / INGREDIENTS), read_yaml(folder / RECIPE)
     state = "is being trained" if holder(store.runs, folder.name) else "was interrupted"
     share = f", {record.share} done" if record.share else ""

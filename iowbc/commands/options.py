@@ -3,15 +3,12 @@
 import socket
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import typer
 
 from iowbc.commands import completion
 from iowbc.errors import UsageError
-
-if TYPE_CHECKING:
-    pass
 
 EXTRAS = {
     "train": (
@@ -25,7 +22,6 @@ EXTRAS = {
 HOST = "127.0.0.1"
 PORT = 8080
 """Default port of a page."""
-LAST_PORT = 65_535
 
 
 def require_extra(extra: str, what: str) -> None:
@@ -39,20 +35,12 @@ def require_extra(extra: str, what: str) -> None:
 
 
 def require_free(port: int) -> None:
-    """Raises `UsageError` with the next port of this machine that is free where this one is taken."""
-    free = next((other for other in range(port, LAST_PORT + 1) if _free(other)), None)
-    if free != port:
-        raise UsageError(f"port {port} is taken; try --port {free or 'with another number'}")
-
-
-def _free(port: int) -> bool:
-    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((HOST, port))
-        except OSError:
-            return False
-    return True
+    """Raises `UsageError` with another port of this machine that is free where this one is taken."""
+    try:
+        socket.create_server((HOST, port)).close()
+    except OSError:
+        with socket.create_server((HOST, 0)) as other:
+            raise UsageError(f"port {port} is taken; try --port {other.getsockname()[1]}") from None
 
 
 RUNS = Path("runs")

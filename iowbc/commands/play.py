@@ -20,7 +20,7 @@ from iowbc.commands.lookup import (
     policy_stages,
     world_of,
 )
-from iowbc.commands.printed import filming, stdout_console, tell
+from iowbc.commands.printed import film_progress, stdout_console, tell
 from iowbc.commands.process import close_on_termination
 from iowbc.commands.request import prepared
 from iowbc.commands.results import evaluated_actor
@@ -95,8 +95,8 @@ def play(
     from iowbc.evaluation.play import play as play_episode
 
     try:
-        with filming(console, request.video) as progress:
-            episode, outcome, pictures = play_episode(source, request, progress=progress)
+        progress = film_progress(console, request.video)
+        episode, outcome, pictures = play_episode(source, request, progress=progress)
     except Interrupted as stopped:
         console.print(str(stopped), markup=False, highlight=False)
         return
@@ -122,15 +122,14 @@ def play_on_web(store: Store, console: Console, word: str, stage: str | None, re
         there = f"ssh -L {port}:{options.HOST}:{port} THIS_MACHINE"
         console.print(f"(from another machine: {there}, and the same address there)", markup=False, highlight=False)
 
-    plan = planned(store, word)
-    skill = skill_to_play(store, word, stage, plan)
+    skill = skill_to_play(store, word, stage)
     if skill is not None:
         from iowbc.live.game import GamePanel
 
         with _game(store, console, skill, request) as game, serving(port) as server:
             Page(server, game, panel=GamePanel).run(ready)
         return
-    source, actor = _driven(store, console, word, stage, plan)
+    source, actor = _driven(store, console, word, stage)
 
     from iowbc.live.session import Session
 
@@ -147,11 +146,11 @@ def planned(store: Store, word: str) -> Planned:
     return Planned(loaded.recipe, {step.stage.name: step.artifact for step in steps if step.cached and step.artifact})
 
 
-def skill_to_play(store: Store, word: str, stage: str | None, plan: Planned = Planned()) -> Artifact | None:
+def skill_to_play(store: Store, word: str, stage: str | None) -> Artifact | None:
     """The skill that a word and `--stage` name; None where they name no skill, or another stage."""
     if stage not in (None, SKILL) or Path(word).is_dir():
         return None
-    if plan.recipe is not None:
+    if (plan := planned(store, word)).recipe is not None:
         return plan.artifacts.get(SKILL)
     with contextlib.suppress(UsageError):  # a first training has nothing finished yet
         return named(store, word).usable.get(SKILL)
@@ -176,38 +175,29 @@ def _game(store: Store, console: Console, skill: Artifact, request: PlayRequest)
     return GameSession(world_of(skill.recipe, generator).deployed, load_student(student.folder), robot, asked)
 
 
-def _driven(
-    store: Store, console: Console, word: str, stage: str | None, plan: Planned
-) -> "tuple[Source, Actor | None]":
+def _driven(store: Store, console: Console, word: str, stage: str | None) -> "tuple[Source, Actor | None]":
     """The policy to drive by hand, and the trials of its evaluation."""
-    evaluation = None
+    found: Mapping[str, Artifact] = {}
     if not Path(word).is_dir():
         with contextlib.suppress(UsageError):  # a first training has nothing finished yet
-            evaluation = named(store, word).artifacts.get("eval")
-    if evaluation is not None and [*named(store, word).artifacts] == ["eval"]:
+            found = named(store, word).artifacts
+    evaluation = found.get("eval")
+    if evaluation is not None and len(found) == 1:
         played = policy_of(store, evaluation)
         require_whole(store.runs, [played])
         source = _whole_source(store, played)
     else:
-        source = named_source(store, console, word, stage, plan=plan)
-    actor = None
+        source = named_source(store, console, word, stage)
     try:
-        actor = None if evaluation is None else evaluated_actor(store, evaluation)
+        return source, None if evaluation is None else evaluated_actor(store, evaluation)
     except UsageError as error:
         tell(console, f"no trials to look through: {error}")
-    return source, actor
+        return source, None
 
 
-def named_source(
-    store: Store,
-    console: Console,
-    word: str,
-    stage: str | None,
-    scene: str | None = None,
-    plan: Planned | None = None,
-) -> "Source":
+def named_source(store: Store, console: Console, word: str, stage: str | None, scene: str | None = None) -> "Source":
     """The source that a word and `--stage` denote; prints a line if it is still in training. Raises `UsageError`, also
-    for a `scene` that its recipe lacks. `plan`: the word's plan, if known.
+    for a `scene` that its recipe lacks.
 
     A recipe file denotes the artifacts that `iowbc plan` reports as cached. The section `eval` of that file, or of the
     recipe's last run for a name, sets how they are played.
@@ -221,7 +211,7 @@ def named_source(
         tell(console, training.text)
         generator = input_artifact(store, training.ingredients, "rg-fit", f"{training.stage} {training.key[:12]}")
         return Source(world_of(training.recipe, generator), training.checkpoint, training.key)
-    plan = plan or planned(store, word)
+    plan = planned(store, word)
     try:
         artifact = playable(store, word, stage, plan)
     except UsageError:

@@ -4,24 +4,20 @@ import os
 import sys
 import textwrap
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from pydantic_core import to_json
 from rich.console import Console
-from rich.progress import Progress
 from rich.table import Table
 
 from iowbc.pipeline.store.artifact import Artifact
 
 FOLDED = ("metrics", "finished stages", "used by", "recipe", "point", "why", "found")
 """Columns whose text may go on in the next line."""
-NARROW = 100
-"""Minimum width of a terminal [characters] for the metrics in `ls`; `show` always has them."""
 INTERVAL = 10.0
-"""Seconds between two lines about a film, where the output is not a terminal."""
+"""Seconds between two lines about a film."""
 PIPE_WIDTH = 160
 """Characters in a line of a table where the output is not a terminal."""
 
@@ -63,13 +59,11 @@ def print_json(console: Console, data: Any) -> None:
     tell(console, to_json(data, indent=2, inf_nan_mode="null").decode("utf-8"))
 
 
-@contextmanager
-def filming(console: Console, film: Path | None) -> Iterator[Callable[[float, float], None]]:
-    """Yields a progress callback for a film, called with the time drawn and the total [s]: a bar on a terminal, lines
-    elsewhere, nothing without a film."""
+def film_progress(console: Console, film: Path | None) -> Callable[[float, float], None]:
+    """A function that is called with the time drawn and the total [s] of a film, and prints them every few seconds;
+    without a film it prints nothing."""
     if film is None:
-        yield lambda seconds, duration: None
-        return
+        return lambda seconds, duration: None
     tell(console, f"{film}: sets up the simulation")
     said = time.monotonic()
 
@@ -79,32 +73,19 @@ def filming(console: Console, film: Path | None) -> Iterator[Callable[[float, fl
             said = time.monotonic()
             tell(console, f"{film}: {seconds:.0f} of {duration:.0f} s")
 
-    if not console.is_terminal:
-        yield say
-        return
-    with Progress(console=console, transient=True) as bar:
-        task = bar.add_task(str(film), total=None)
-        yield lambda seconds, duration: bar.update(task, completed=seconds, total=duration)
+    return say
 
 
 def artifact_data(artifact: Artifact) -> dict[str, Any]:
     """An artifact for other programs."""
     manifest = artifact.manifest
+    own = {"stage", "key", "version", "recipe", "made", "seconds", "attempts", "workers", "host", "versions"}
     return {
-        "stage": manifest.stage,
-        "key": manifest.key,
-        "version": manifest.version,
+        **manifest.model_dump(include=own),
         "content": manifest.digest,
-        "recipe": manifest.recipe,
         "folder": shown_path(artifact.folder),
         "published": artifact.published,
-        "made": manifest.made,
-        "seconds": manifest.seconds,
-        "attempts": manifest.attempts,
-        "workers": manifest.workers,
-        "host": manifest.host,
         "bytes": artifact.size,
         "files": {name: record.size for name, record in manifest.files.items()},
-        "versions": manifest.versions,
         "metrics": artifact.metrics,
     }

@@ -11,6 +11,7 @@ from rich.text import Text
 
 from iowbc.commands.lookup import input_of, last_used, policy_of, policy_stages, world_of
 from iowbc.commands.printed import shown_path, tell
+from iowbc.deploy.exported_folder import STEP
 from iowbc.errors import UsageError
 from iowbc.pipeline.console.wording import KEY_LENGTH, figure
 from iowbc.pipeline.store.artifact import Artifact
@@ -35,7 +36,6 @@ TABLES = (
 """The main tables, in their order."""
 DRAWN = ("lifting", "pushing", "heavy", "trainings", "probe")
 """Those that are drawn at the end of a run; the others are named."""
-EXPORTED = "step.onnx"
 TRIALS, PROBE = "trials.parquet", "probe.parquet"
 
 
@@ -57,7 +57,7 @@ def print_results(runs: Runs, recipe: str, artifacts: Mapping[str, Artifact], co
         pictures = len(list((folder / "figures").glob("*")))
         if pictures:
             tell(console, f"figures  {shown_path(folder / 'figures')} ({pictures})")
-        if (folder / EXPORTED).is_file():
+        if (folder / STEP).is_file():
             tell(console, f"controller  {shown_path(folder)}")
     if artifacts:
         tell(console, "next:")

@@ -15,7 +15,7 @@ from iowbc.commands.printed import shown_path, stdout_console, tell
 from iowbc.commands.process import DONE, INTERRUPTED, STAGE_FAILED, RunEnding, ignoring_broken_outputs
 from iowbc.commands.request import Request, in_order, planners
 from iowbc.commands.results import main_tables, print_results
-from iowbc.errors import Interrupted, NoRenderer, PipelineFailed, UsageError
+from iowbc.errors import Interrupted, PipelineFailed, UsageError
 from iowbc.pipeline.console.display import Display, PlainDisplay
 from iowbc.pipeline.console.live_table import LiveTable
 from iowbc.pipeline.planner import Planner
@@ -98,7 +98,7 @@ def compare_variants(request: Request, loaded: Sequence[LoadedRecipe], console: 
     compare(words, output, runs=request.runs.root)
     try:
         film = film_joint(Store(request.runs), console, words, output)
-    except (NoRenderer, UsageError) as reason:
+    except UsageError as reason:
         film = None
         tell(console, f"no film: {reason}")
     if film is not None:

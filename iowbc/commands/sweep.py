@@ -1,5 +1,6 @@
 """`iowbc sweep`: runs a recipe with every combination of given values, and reports the results."""
 
+import math
 from collections.abc import Sequence
 from contextlib import nullcontext
 from functools import partial
@@ -34,8 +35,6 @@ if TYPE_CHECKING:
 
 LOGS = "logs"
 """Folder of a sweep with what each point prints."""
-MANY = 100
-"""Number of points from which it is printed before planning, which takes a while."""
 
 
 def sweep(
@@ -86,13 +85,8 @@ def ready(asked: Request, file: Path | None, most: int) -> tuple[Sweep, list[Pla
     if asked.options.force:
         text = "names a stage that points may share; force it in one of them with `iowbc run`"
         raise RecipeError([Problem(f"--force {min(asked.options.force)}", text)])
-    found = load_sweep(asked.word, asked.overrides, file, most, _tell_count)
+    found = load_sweep(asked.word, asked.overrides, file, most)
     return found, [prepared(point.loaded, asked.runs, asked.options) for point in found.points]
-
-
-def _tell_count(count: int) -> None:
-    if count >= MANY:
-        Console(stderr=True).print(f"plans {count:,} points", highlight=False)
 
 
 def _require_origins(asked: Request, planners: Sequence[Planner]) -> None:
@@ -204,11 +198,12 @@ def _conclude(
     finished = {name: named(Store(runs), name) for name, state in states.items() if state == "done"}
     if not finished:
         return
-    made = outcomes(found, finished)
-    results = table(found, made)
-    paths = write_results(found, made, finished, states, folder)
+    lines = outcomes(found, finished)
+    results = table(found, lines)
+    paths = write_results(found, lines, finished, states, folder)
     if record is not None:
-        figures = {f"{line.label}/{name}": value for line in made.lines for name, value in line.means.items()}
+        means = {f"{line.label}/{name}": mean for line in lines for name, mean in line.means.items()}
+        figures = {name: mean for name, mean in means.items() if math.isfinite(mean)}
         record.describe(markdown(results), figures, [folder / FIGURE, folder / TABLE])
     console.print(drawn(results, console.width))
     for path in paths:

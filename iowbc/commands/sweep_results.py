@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -22,20 +21,9 @@ OUTCOMES_SHOWN = 6
 TABLE, FIGURE, POINTS = "table.md", "parallel.png", "points.csv"
 
 
-@dataclass(frozen=True)
-class Outcomes:
-    """Finished points, with those that differ only in their seed in one line."""
-
-    settings: tuple[str, ...]
-    """Dotted paths of the varied settings, without seeds."""
-    metrics: tuple[str, ...]
-    """Shown metrics, as `stage metric`."""
-    lines: tuple[Line, ...]
-
-
-def outcomes(sweep: Sweep, found: Mapping[str, Run]) -> Outcomes:
-    """The outcomes of the points; `found`: the finished ones by name."""
-    settings = tuple(path for path in sweep.axes if path not in SEEDS)
+def outcomes(sweep: Sweep, found: Mapping[str, Run]) -> list[Line]:
+    """A line for each setting, seeds together; `found`: the finished points by name, at least one."""
+    settings = [path for path in sweep.axes if path not in SEEDS]
     points = [point for point in sweep.points if point.name in found]
     metrics = _chosen([found[point.name] for point in points])
     groups: dict[tuple[str, ...], list[Point]] = {}
@@ -44,7 +32,7 @@ def outcomes(sweep: Sweep, found: Mapping[str, Run]) -> Outcomes:
     lines = []
     for group in groups.values():
         own, runs = {path: group[0].settings[path] for path in settings}, [found[point.name] for point in group]
-        means, halves = {}, {}
+        means, halves = dict.fromkeys(metrics, math.nan), dict.fromkeys(metrics, math.nan)
         for name in metrics:
             # Points that share an artifact count as one measurement.
             stage = name.partition(" ")[0]
@@ -54,9 +42,8 @@ def outcomes(sweep: Sweep, found: Mapping[str, Run]) -> Outcomes:
                 alike = len(values) > 1 and not np.ptp(values)
                 means[name], halves[name] = float(values.mean()), 0.0 if alike else mean_half_width(values)
         label = ", ".join(f"{path.rpartition('.')[2]} {written(value)}" for path, value in own.items()) or sweep.name
-        singles = [{name: value for name in metrics if not math.isnan(value := _metric(run, name))} for run in runs]
-        lines.append(Line(label, own, means, halves, singles))
-    return Outcomes(settings, metrics, tuple(lines))
+        lines.append(Line(label, own, means, halves, [{name: _metric(run, name) for name in metrics} for run in runs]))
+    return lines
 
 
 def _metric(run: Run, name: str) -> float:
@@ -84,38 +71,33 @@ def _chosen(runs: Sequence[Run]) -> tuple[str, ...]:
 
 
 def write_results(
-    sweep: Sweep, made: Outcomes, found: Mapping[str, Run], states: Mapping[str, str], folder: Path
+    sweep: Sweep, lines: Sequence[Line], found: Mapping[str, Run], states: Mapping[str, str], folder: Path
 ) -> list[Path]:
     """Write table, figure and points; returns their paths."""
     paths = [folder / name for name in (TABLE, FIGURE, POINTS)]
-    paths[0].write_text(markdown(table(sweep, made)), encoding="utf-8")
+    paths[0].write_text(markdown(table(sweep, lines)), encoding="utf-8")
     title = f"{sweep.name}: means over seeds (thick), 95 % intervals (bars), single runs (thin)"
-    write_figure(parallel_coordinates(made.settings, made.metrics, made.lines, title), paths[1])
-    _write_points(sweep, found, states, paths[2])
+    write_figure(parallel_coordinates(lines, title), paths[1])
+    rows = []
+    for point in sweep.points:
+        row = {"point": point.name, "state": states.get(point.name, "waits"), **point.settings}
+        for stage, artifact in found[point.name].artifacts.items() if point.name in found else ():
+            row |= {f"{stage}/{name}": value for name, value in artifact.metrics.items()}
+        rows.append(row)
+    pd.DataFrame(rows).to_csv(paths[2], index=False)
     return paths
 
 
-def table(sweep: Sweep, made: Outcomes) -> Table:
+def table(sweep: Sweep, lines: Sequence[Line]) -> Table:
     """A row for each setting: means over seeds with half their 95 % interval."""
-    settings = [path.rpartition(".")[2] for path in made.settings]
+    settings = [path.rpartition(".")[2] for path in lines[0].settings]
     rows = [
         (
             *map(written, line.settings.values()),
             str(len(line.runs)),
-            *(
-                measured(line.means.get(name, math.nan), line.halves.get(name, math.nan), ".4g", ".2g", none="")
-                for name in made.metrics
-            ),
+            *(measured(mean, line.halves[name], ".4g", ".2g", none="") for name, mean in line.means.items()),
         )
-        for line in made.lines
+        for line in lines
     ]
     caption = f"Sweep {sweep.name}: means over seeds with their 95 % interval."
-    return Table(sweep.name, caption, heads(*settings, "seeds", *made.metrics), rows, grouped=False)
-
-
-def _write_points(sweep: Sweep, found: Mapping[str, Run], states: Mapping[str, str], path: Path) -> None:
-    rows = [{"point": point.name, "state": states.get(point.name, "waits"), **point.settings} for point in sweep.points]
-    for row, point in zip(rows, sweep.points, strict=True):
-        for stage, artifact in found[point.name].artifacts.items() if point.name in found else ():
-            row |= {f"{stage}/{name}": value for name, value in artifact.metrics.items()}
-    pd.DataFrame(rows).to_csv(path, index=False)
+    return Table(sweep.name, caption, heads(*settings, "seeds", *lines[0].means), rows, grouped=False)

@@ -7,7 +7,7 @@ from typing import Any
 
 from iowbc.files import write_whole
 from iowbc.learning.curve_titles import title_of
-from iowbc.results.frame import write_frame
+from iowbc.results.table import write_frame
 
 TABLE, FIGURE = "tables/learning_curves.parquet", "figures/learning_curves.png"
 """Paths in an artifact."""

@@ -179,7 +179,7 @@ class Planner:
                 and MISSING not in (old, new)
                 and stage.name not in self.options.force
             ):
-                yield f"{path} is {_shown(old)} in it; `--force {stage.name}` makes it with {_shown(new)}"
+                yield f"{path} is {shown(old)} in it; `--force {stage.name}` makes it with {shown(new)}"
 
     def _closest(self, stage: str, ingredients: Mapping[str, Any]) -> Artifact | None:
         """The stored artifact of a stage that differs least; of several this recipe's own, then the newest."""
@@ -203,7 +203,7 @@ class Planner:
     def _differences(self, ingredients: Mapping[str, Any], old: Mapping[str, Any]) -> Iterator[str]:
         """Differences of a key's ingredients from earlier ones, each with its place in the recipe."""
         for path, before, after in differences(nested(old.get("recipe", {})), nested(ingredients["recipe"])):
-            yield f"{path} ({self.loaded.place(path)}): {_shown(before)} -> {_shown(after)}"
+            yield f"{path} ({self.loaded.place(path)}): {shown(before)} -> {shown(after)}"
         if old.get("version") != ingredients["version"]:
             yield f"stage version {old.get('version')} -> {ingredients['version']}"
         if old.get("robot") != ingredients["robot"]:
@@ -298,7 +298,3 @@ def _origin(loaded: LoadedRecipe, borrowed: ExternalInput, above: Sequence[Path]
     if origin.recipe.robot != loaded.recipe.robot:
         raise wrong_origin(loaded, borrowed, f"is about another robot, {origin.recipe.robot}")
     return origin
-
-
-def _shown(value: Any) -> str:
-    return "(absent)" if value is MISSING else shown(value)

@@ -7,7 +7,7 @@ import json
 import math
 import random
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -127,12 +127,11 @@ def load_sweep(
     settings: Sequence[str],
     file: Path | None = None,
     most: int = MOST_POINTS,
-    counted: Callable[[int], None] = lambda count: None,
 ) -> Sweep:
     """The points of a sweep, all of them valid recipes. Raises `RecipeError`.
 
     settings: `path=value` holds for all points; `path=a,b` and `path=0..4` vary it, and override the file.
-    most: largest number of points. counted: called with their number before any is read.
+    most: largest number of points.
     """
     described = SweepFile() if file is None else _read_file(file)
     grid = {path: _expanded(values, f"{file}") for path, values in described.grid.items()}
@@ -157,7 +156,6 @@ def load_sweep(
     if count > most:
         text = f"{count:,} points, more than {most:,}; vary less, or allow them: `iowbc sweep --points {count}`"
         raise RecipeError([Problem(str(file or "--set"), text)])
-    counted(count)
     points = []
     for draw in drawn:
         for combination in itertools.product(*grid.values()):

@@ -1,6 +1,5 @@
 """Learning curves over steps and errors over masses, which a page draws with plotly and a picture with matplotlib."""
 
-import csv
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from html import escape
@@ -125,11 +124,10 @@ def evaluation_panels(groups: Sequence[Group]) -> list[CurvePanel]:
     """Success and errors over the mass, for each suite that sweeps it."""
     panels: dict[tuple[str, str], CurvePanel] = {}
     for place, group in enumerate(groups):
-        folders = [run.artifacts["eval"].folder for run in group.runs if "eval" in run.artifacts]
-        for suite in dict.fromkeys(suite for folder in folders for suite in _suites(folder)):
-            sweeps = [found[suite] for folder in folders if suite in (found := _suites(folder))]
+        found = [_suites(run.artifacts["eval"].folder) for run in group.runs if "eval" in run.artifacts]
+        for suite in dict.fromkeys(suite for suites in found for suite in suites):
             for name, title in ERRORS.items():
-                curves = [sweep[name] for sweep in sweeps]
+                curves = [suites[suite][name] for suites in found if suite in suites]
                 joined = _joined([curve[:2] for curve in curves]) if len(curves) > 1 else curves[0]
                 new = CurvePanel(f"{suite}: {title}", across="mass [kg]", mode="lines+markers", from_zero=True)
                 panels.setdefault((suite, name), new).curves.append(Curve(group.label, place, *joined))
@@ -163,20 +161,13 @@ def _columns(folder: Path) -> dict[str, Values]:
     return {name: np.asarray(table[name], np.float64) for name in table.select_dtypes("number") if "step" in table}
 
 
-def _rows(path: Path) -> pd.DataFrame:
-    """The rows of a table as texts, cells beyond the last head under ""; none where it is not there."""
-    if not path.is_file():
-        return pd.DataFrame()
-    with path.open(newline="", encoding="utf-8", errors="replace") as file:
-        return pd.DataFrame(csv.DictReader(file, restkey=""))
-
-
 def _suites(folder: Path) -> dict[str, dict[str, tuple[Values, Values, Values, Values]]]:
     """Masses, means, and both ends of the interval, by suite that varies the mass and by error.
 
     Intervals of errors are clipped at 0; for a mean over one trial the ends are NaN.
     """
-    rows = _rows(folder / "tables" / "summary.csv")
+    file = folder / "tables" / "summary.csv"
+    rows = pd.read_csv(file, dtype=str, encoding_errors="replace") if file.is_file() else pd.DataFrame()
     if not {"suite", "case", "mass"} <= {*rows}:
         return {}
     rows = rows.assign(mass=_numbers(rows, "mass")).dropna(subset="mass").sort_values("mass", kind="stable")

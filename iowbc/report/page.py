@@ -12,7 +12,7 @@ from types import MappingProxyType
 from iowbc.learning.curves import FIGURE
 from iowbc.pipeline.console.wording import KEY_LENGTH, duration
 from iowbc.pipeline.store.artifact import INGREDIENTS, RECIPE, Artifact
-from iowbc.report.curves import CurvePanel, evaluation_panels, learning_panels
+from iowbc.report.curves import evaluation_panels, learning_panels
 from iowbc.report.runs import Group, Run, metric_rows
 from iowbc.results.table import Table
 from iowbc.stages.registry import STAGES
@@ -40,12 +40,8 @@ def write_page(
     template = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True).from_string(
         files("iowbc.report").joinpath("page.html").read_text(encoding="utf-8")
     )
-    curves: dict[str, CurvePanel] = {}
-    learning = []
-    for stage in (name for name, one in STAGES.items() if one.presentation.trained_by):
-        main, others = learning_panels(groups, stage)
-        learning.append((stage, _numbered(curves, main), _numbered(curves, others)))
-    evaluation = _numbered(curves, evaluation_panels(groups))
+    trained = [name for name, stage in STAGES.items() if stage.presentation.trained_by]
+    learning = [(stage, *learning_panels(groups, stage)) for stage in trained]
     text = template.render(
         title=" · ".join(run.label for run in runs),
         made=time.strftime("%Y-%m-%d %H:%M"),
@@ -56,7 +52,7 @@ def write_page(
         tables=tables,
         more_tables=more_tables,
         learning=[entry for entry in learning if entry[1] or entry[2]],
-        evaluation=evaluation,
+        evaluation=evaluation_panels(groups),
         films=_media(runs, "videos", together, ".mp4"),
         pictures=_media(runs, "figures", together, ".png"),
         first_pictures=[name for stage in STAGES.values() for name in stage.presentation.pictures],
@@ -64,18 +60,10 @@ def write_page(
         provenance=[(run, stage, made, _beside(made)) for run in runs for stage, made in run.artifacts.items()],
         key_shown=KEY_LENGTH,
         duration=duration,
-        curves={name: panel.figure for name, panel in curves.items()},
         plotly=get_plotlyjs().replace("</script", "<\\/script"),
         nonce=secrets.token_urlsafe(),
     )
     path.write_text(text, encoding="utf-8")
-
-
-def _numbered(curves: dict[str, CurvePanel], panels: Sequence[CurvePanel]) -> list[str]:
-    """Add panels to the page's curves; returns their names."""
-    names = [f"curve{len(curves) + place}" for place in range(len(panels))]
-    curves.update(zip(names, panels, strict=True))
-    return names
 
 
 def _media(runs: Sequence[Run], folder: str, together: Mapping[str, bytes], kind: str) -> list[tuple[str, str, str]]:

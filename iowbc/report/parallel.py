@@ -9,7 +9,7 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize
+from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
@@ -33,8 +33,9 @@ class Line:
     label: str
     settings: Mapping[str, JsonValue]
     means: Mapping[str, float]
+    """Mean of each outcome; all lines have the same. NaN where there is none, as in the two below."""
     halves: Mapping[str, float]
-    """Half the interval of each mean; NaN where there is none."""
+    """Half the interval of each mean."""
     runs: Sequence[Mapping[str, float]]
     """Outcomes of each single run."""
 
@@ -50,8 +51,9 @@ class AxisScale:
     """Positions and texts of labels."""
 
 
-def parallel_coordinates(settings: Sequence[str], outcomes: Sequence[str], lines: Sequence[Line], title: str) -> Figure:
+def parallel_coordinates(lines: Sequence[Line], title: str) -> Figure:
     """Axes for settings, then outcomes; thick lines: means, bars: their intervals, thin lines: single runs."""
+    settings, outcomes = [*lines[0].settings], [*lines[0].means]
     scales = [_setting(name, lines) for name in settings] + [_outcome(name, lines) for name in outcomes]
     figure = Figure(figsize=(max(6.0, AXIS_WIDTH * len(scales) + 1.0), 4.6), layout="constrained")
     axes = figure.subplots()
@@ -61,16 +63,12 @@ def parallel_coordinates(settings: Sequence[str], outcomes: Sequence[str], lines
         axes.plot(range(len(scales)), heights, **style)
 
     for line, colour in zip(lines, _colours(figure, axes, lines, outcomes), strict=True):
-        fixed = [line.settings.get(name) for name in settings]
         for run in line.runs if len(line.runs) > 1 else ():
-            draw([*fixed, *(run.get(name) for name in outcomes)], color=colour, lw=0.7, alpha=0.5)
-        means = [line.means.get(name) for name in outcomes]
-        draw([*fixed, *means], color=colour, lw=2.2, marker="o", ms=4, label=line.label)
-        for place, (name, mean) in enumerate(zip(outcomes, means, strict=True), len(settings)):
-            half = line.halves.get(name, math.nan)
-            if mean is not None and math.isfinite(half):
-                ends = [scales[place].height(mean - half), scales[place].height(mean + half)]
-                axes.plot([place, place], ends, color=colour, lw=5, alpha=0.35, solid_capstyle="butt")
+            draw([*line.settings.values(), *run.values()], color=colour, lw=0.7, alpha=0.5)
+        draw([*line.settings.values(), *line.means.values()], color=colour, lw=2.2, marker="o", ms=4, label=line.label)
+        for place, (name, mean) in enumerate(line.means.items(), len(settings)):
+            ends = [scales[place].height(mean + side * line.halves[name]) for side in (-1.0, 1.0)]
+            axes.plot([place, place], ends, color=colour, lw=5, alpha=0.35, solid_capstyle="butt")
     for place, scale in enumerate(scales):
         axes.axvline(place, color="0.3", lw=0.8, zorder=0)
         for height, text in scale.marks:
@@ -88,7 +86,7 @@ def parallel_coordinates(settings: Sequence[str], outcomes: Sequence[str], lines
 
 def _setting(name: str, lines: Sequence[Line]) -> AxisScale:
     """The axis of a setting: numbers to scale, other values at equal distances."""
-    short, values = name.rpartition(".")[2], [line.settings.get(name) for line in lines]
+    short, values = name.rpartition(".")[2], [line.settings[name] for line in lines]
     numbers = [float(value) for value in values if isinstance(value, (int, float)) and not isinstance(value, bool)]
     if len(numbers) == len(values):
         return _numbers(short, numbers, named=True)
@@ -101,10 +99,8 @@ def _setting(name: str, lines: Sequence[Line]) -> AxisScale:
 
 def _outcome(name: str, lines: Sequence[Line]) -> AxisScale:
     """The axis of an outcome, with room for every interval."""
-    found = [run.get(name, math.nan) for line in lines for run in line.runs]
-    for line in lines:
-        mean, half = line.means.get(name, math.nan), line.halves.get(name, math.nan)
-        found += [mean - half, mean + half]
+    found = [run[name] for line in lines for run in line.runs]
+    found += [line.means[name] + side * line.halves[name] for line in lines for side in (-1.0, 1.0)]
     return _numbers(
         name.replace(" ", "\n", 1), [value for value in found if math.isfinite(value)] or [0.0], named=False
     )
@@ -113,15 +109,10 @@ def _outcome(name: str, lines: Sequence[Line]) -> AxisScale:
 def _numbers(name: str, values: Sequence[float], *, named: bool) -> AxisScale:
     low, high = min(values), max(values)
     logarithmic = named and low > 0 and high / low > ORDERS
+    scale = LogNorm(low, high) if logarithmic else Normalize(low, high)
 
     def height(value: JsonValue) -> float:
-        if not isinstance(value, (int, float)) or not math.isfinite(value):
-            return math.nan
-        if high <= low:
-            return 0.5
-        if logarithmic:
-            return math.log(max(float(value), low) / low) / math.log(high / low)
-        return (float(value) - low) / (high - low)
+        return float(scale(value)) if isinstance(value, (int, float)) and math.isfinite(value) else math.nan
 
     marked = sorted(set(values))
     if not (named and len(marked) <= VALUES_NAMED):
@@ -134,7 +125,7 @@ def _colours(figure: Figure, axes: Axes, lines: Sequence[Line], outcomes: Sequen
     """A colour per line: from the palette, or for many lines by the last outcome."""
     if len(lines) <= len(COLOURS) or not outcomes:
         return [COLOURS[place % len(COLOURS)] for place in range(len(lines))]
-    last = [line.means.get(outcomes[-1], math.nan) for line in lines]
+    last = [line.means[outcomes[-1]] for line in lines]
     finite = [value for value in last if math.isfinite(value)] or [0.0]
     shade = ScalarMappable(Normalize(min(finite), max(finite)), matplotlib.colormaps["viridis"])
     figure.colorbar(shade, ax=axes, label=outcomes[-1], pad=0.01)

@@ -12,7 +12,6 @@ from iowbc.pipeline.store.artifact import Artifact
 from iowbc.recipe.recipe import SEEDS
 from iowbc.results.table import Cell, Column, MeanCell, Table, heads
 
-EVAL = "eval"
 NAMING = ("name", "description", "execution")
 """Parts of a recipe in which runs of one group may differ, beside their seeds."""
 
@@ -126,8 +125,8 @@ def _of_one_variant(first: Run, second: Run) -> bool:
     decided = [
         [_seedless(run.artifacts[stage].ingredients.get("recipe", {})) for stage in shared] for run in (first, second)
     ]
-    labels = [run.recipe.get(EVAL, {}).get("label") for run in (first, second)]
-    return EVAL in shared and all(decided[0]) and decided[0] == decided[1] and labels[0] == labels[1]
+    labels = [run.recipe.get("eval", {}).get("label") for run in (first, second)]
+    return "eval" in shared and all(decided[0]) and decided[0] == decided[1] and labels[0] == labels[1]
 
 
 def _seedless(recipe: Mapping[str, Any]) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from iowbc.pipeline.stage import Job, Presentation, Stage
 from iowbc.recipe.evaluation.sequences import LIFTING, PUSHING
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.section import deciding
-from iowbc.results.frame import write_frame
+from iowbc.results.table import write_frame
 from iowbc.stages.inputs import generator_stage, leaves_student, policy_stage
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from iowbc.pipeline.stage import ExternalInput, Job, Presentation, Stage
 from iowbc.recipe.recipe import Recipe
-from iowbc.results.frame import write_frame
+from iowbc.results.table import write_frame
 from iowbc.stages.inputs import generator_stage, leaves_student, policy_stage
 from iowbc.stages.skill import GAME
 

@@ -7,21 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from iowbc.commands.export import export, exported_folder
+from iowbc.commands.export import export
 from iowbc.errors import UsageError
-from iowbc.pipeline.store.runs import Runs
-from iowbc.pipeline.store.store import Store
 from iowbc.web.page import SOURCE, npm_parts, parts_folder
 
 
-@pytest.fixture
-def store(folder: Path) -> Store:
-    return Store(Runs(folder / "runs"))
-
-
-def test_a_page_is_of_an_exported_controller(store: Store) -> None:
-    with pytest.raises(UsageError, match=r"first/teacher: no exported controller; finished: teacher; run a recipe"):
-        exported_folder(store, "first/teacher")
+def test_a_page_is_of_an_exported_controller(folder: Path, tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"first/teacher: no policy of stage export to play; .*; finished: teacher$"):
+        export("first/teacher", tmp_path / "page", folder / "runs")
 
 
 def test_a_folder_with_other_files_is_left_alone(folder: Path, tmp_path: Path) -> None:

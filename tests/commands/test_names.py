@@ -10,7 +10,6 @@ import pytest
 
 from iowbc import open_artifact
 from iowbc.commands import completion
-from iowbc.commands.export import exported_folder as exported_by
 from iowbc.commands.lookup import named
 from iowbc.commands.play import playable
 from iowbc.deploy.exported_folder import exported_folder
@@ -81,7 +80,7 @@ def test_a_run_that_has_begun_does_not_hide_what_is_published_until_it_has_its_o
     shipped = open_artifact("first/export", folder / "runs")
     assert shipped.published
     assert playable(store, "first", None) == shipped
-    assert exported_by(store, "first") == shipped.folder
+    assert playable(store, "first", "export") == shipped
     assert playable(store, "first", "teacher").manifest.key == key("first", "teacher")
     assert [*named(store, "first").artifacts] == ["rg-dataset", "rg-fit", "teacher"], "those of this run alone"
     assert command("run", "first.yaml").returncode == 0

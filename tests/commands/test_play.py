@@ -17,7 +17,7 @@ from rich.console import Console
 from iowbc.commands import printed
 from iowbc.commands.lookup import in_training
 from iowbc.commands.play import _whole_source, named_source
-from iowbc.commands.printed import filming
+from iowbc.commands.printed import film_progress
 from iowbc.errors import UsageError
 from iowbc.evaluation.play import requested_episode
 from iowbc.evaluation.play_request import PlayRequest
@@ -108,12 +108,10 @@ def test_play_that_is_terminated_leaves_no_part_of_its_film(tmp_path: Path) -> N
 def test_a_film_says_how_far_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(printed, "INTERVAL", 0.0)
     stream = io.StringIO()
-    with filming(Console(file=stream), Path("box.mp4")) as told:
-        told(5.0, 40.0)
+    film_progress(Console(file=stream), Path("box.mp4"))(5.0, 40.0)
     assert stream.getvalue() == "box.mp4: sets up the simulation\nbox.mp4: 5 of 40 s\n"
     silent = io.StringIO()
-    with filming(Console(file=silent), None) as told:
-        told(5.0, 40.0)
+    film_progress(Console(file=silent), None)(5.0, 40.0)
     assert silent.getvalue() == ""
 
 

@@ -3,13 +3,14 @@
 import pytest
 
 from iowbc.benchmarks import reference
+from iowbc.recipe.recipe import Recipe
 
 
 def test_both_methods_are_measured_for_each_number_of_workers(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(reference, "SAMPLES", {"static": (64, 8), "ocp": (8, 1)})
-    figures = reference.main(workers=(1,), turns=1)
+    figures = reference.main(Recipe(name="bench"), workers=(1,), turns=1)
     lines = capsys.readouterr().out.splitlines()
     assert set(figures) == {f"{method}{name}_1" for method in ("static", "ocp") for name in ("", "_a_core", "_scaling")}
     assert figures["static_scaling_1"] == 1.0
