@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
@@ -238,19 +237,12 @@ def _capacity_bars(axes: Axes, found: Capacities, names: Sequence[str]) -> None:
 
 def _mark_survivors(axes: Axes, rows: pd.DataFrame, place: int, colour: str) -> None:
     """Mark masses that not all trials survived at the upper edge, one line per variant: survivors, or a cross."""
-    transform, height = axes.get_xaxis_transform(), 0.98 - FAILURE_SPACING * place
-    failed = rows[rows["survived"] == 0]["mass"]
-    crosses = axes.plot(failed, [height] * len(failed), "x", color=colour, transform=transform, clip_on=False)
-    text: dict[str, Any] = {"color": colour, "transform": transform, "ha": "center", "va": "center", "fontsize": 7}
-    marks: list[Artist] = [
-        *crosses,
-        *(
-            axes.text(float(row.mass), height, f"{row.survived}/{row.trials}", **text)
-            for row in rows[(rows["survived"] > 0) & (rows["survived"] < rows["trials"])].itertuples()
-        ),
-    ]
-    for mark in marks:
-        mark.set_in_layout(False)
+    style: dict[str, Any] = {"color": colour, "transform": axes.get_xaxis_transform(), "in_layout": False}
+    height, failed = 0.98 - FAILURE_SPACING * place, rows[rows["survived"] == 0]["mass"]
+    axes.plot(failed, [height] * len(failed), "x", clip_on=False, **style)
+    for row in rows[(rows["survived"] > 0) & (rows["survived"] < rows["trials"])].itertuples():
+        count = f"{row.survived}/{row.trials}"
+        axes.text(float(row.mass), height, count, ha="center", va="center", fontsize=7, **style)
 
 
 def _from_zero(axes: Axes) -> None:
