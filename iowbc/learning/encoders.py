@@ -1,15 +1,11 @@
 """The student's encoder from a history of observations to a latent, and the estimate of s_priv from it."""
 
-from typing import Literal
-
 import torch
 from torch import Tensor, nn
 
 from iowbc.learning.activations import ACTIVATIONS
 from iowbc.learning.symmetric import SymmetricHead
 from iowbc.robot.mirror import MirrorMap
-
-EncoderName = Literal["mlp"]
 
 
 class MlpEncoder(nn.Module):
