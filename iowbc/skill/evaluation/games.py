@@ -2,6 +2,7 @@
 
 import itertools
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -76,7 +77,7 @@ def play_batches(
         path = work / f"{place.replace('/', '-').replace(' ', '_')}.parquet"
         if not path.is_file():
             plans = [replace(plan, rule=competitor.rule) for plan in batch]
-            with TransportGame(*controller, n=len(plans), workers=workers, plans=plans) as game:
+            with closing(TransportGame(*controller, n=len(plans), workers=workers, plans=plans)) as game:
                 _require_fitting(competitor, game.observation_sizes[ROBOT])
                 figures = play_once(game, {ROBOT: competitor.robot, HUMAN: human}, interrupted)
             rows = pd.DataFrame(figures).assign(
