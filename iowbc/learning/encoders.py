@@ -1,5 +1,7 @@
 """The student's encoder from a history of observations to a latent, and the estimate of s_priv from it."""
 
+from typing import cast
+
 import torch
 from torch import Tensor, nn
 
@@ -58,10 +60,7 @@ class PrivilegedEstimate(nn.Module):
             nn.init.zeros_(parameter)
 
     def forward(self, latent: Tensor) -> Tensor:
-        estimate: Tensor
-        if self.symmetric:
-            own, image = latent.chunk(2, dim=-1)
-            estimate = self.head(own + image, own - image)
-        else:
-            estimate = self.head(latent)
-        return estimate
+        if not self.symmetric:
+            return cast(Tensor, self.head(latent))
+        own, image = latent.chunk(2, dim=-1)
+        return cast(Tensor, self.head(own + image, own - image))
