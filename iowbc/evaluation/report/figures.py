@@ -29,9 +29,6 @@ LABELS = {
     "E_v": "$E_v$, velocity [m/s]",
     "E_psi": "$E_\\psi$, heading [rad]",
 }
-MARKS = "means over the trials survived; at the upper edge: how many where not all survived, × none"
-STILL_NOTE = "grey: a robot that stands still"
-PAPER_NOTE = "hollow, dotted: the paper's numbers, for its own commands; the friction of its crates is unknown"
 PANEL_WIDTH, SMALLEST_WIDTH = 3.75, 7.5
 """Width of a panel of the comparison, and minimum width of the whole figure [inch]."""
 VARIANTS_PER_PANEL = 4
@@ -173,7 +170,9 @@ def _with_paper(rows: pd.DataFrame) -> bool:
 
 def _note(with_paper: bool) -> str:
     """The meaning of marks, grey lines and dotted ones."""
-    return f"{MARKS}\n{'; '.join([PAPER_NOTE] * with_paper + [STILL_NOTE])}"
+    marks = "means over the trials survived; at the upper edge: how many where not all survived, × none"
+    paper = "hollow, dotted: the paper's numbers, for its own commands; the friction of its crates is unknown; "
+    return f"{marks}\n{paper * with_paper}grey: a robot that stands still"
 
 
 def _sweep_panel(
