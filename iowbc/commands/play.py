@@ -159,7 +159,7 @@ def skill_to_play(store: Store, word: str, stage: str | None) -> Artifact | None
 
 def _game(store: Store, console: Console, skill: Artifact, request: PlayRequest) -> "GameSession":
     """The games of a skill, beginning with the first task of the requested scene. Raises `UsageError`."""
-    from iowbc.learning.storage import read_teacher
+    from iowbc.learning.storage import load_teacher
     from iowbc.live.game import GameRequest, GameSession
     from iowbc.skill.lower_layer import load_student
 
@@ -171,7 +171,7 @@ def _game(store: Store, console: Console, skill: Artifact, request: PlayRequest)
     first = {getattr(recipe.skill.tasks, name).scene: name for name in reversed(recipe.skill.tasks.names)}
     require_known(request.scene, "scene with a transport task", first)
     tell(console, f"skill of {skill.manifest.recipe}: you are its partner")
-    robot, asked = read_teacher(skill.folder, "robot"), GameRequest(first[request.scene], request.seed)
+    robot, asked = load_teacher(skill.folder, "robot")[0], GameRequest(first[request.scene], request.seed)
     return GameSession(world_of(skill.recipe, generator).deployed, load_student(student.folder), robot, asked)
 
 

@@ -15,8 +15,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from iowbc.errors import NoRenderer
 from iowbc.evaluation.trials.plan import Trial
-from iowbc.evaluation.trials.policy_in_batch import in_batch
-from iowbc.evaluation.trials.rollout import play_in
+from iowbc.evaluation.trials.rollout import in_batch, play_in
 from iowbc.evaluation.trials.table import replayed
 from iowbc.evaluation.trials.trace import Outcome
 from iowbc.learning.acting import Policy

@@ -14,12 +14,10 @@ from sklearn.pipeline import Pipeline
 from sklearn.preprocessing import StandardScaler
 
 from iowbc.errors import StageFailed
-from iowbc.evaluation.trials.plan import UNDISTURBED, command_script, planned_episode
+from iowbc.evaluation.trials.plan import command_script, held_fixed, planned_episode
 from iowbc.evaluation.trials.rollout import play_episodes
 from iowbc.learning.acting import Policy, StudentPolicy
-from iowbc.recipe.recipe import Recipe
 from iowbc.rollouts.history import History
-from iowbc.task.episodes import Episode
 from iowbc.task.specification import Specification
 
 Features = NDArray[np.float32]
@@ -71,36 +69,15 @@ class RecordingPolicy:
         frames = self._history.push(observation[:, :size], self._starts)
         self._starts[:] = False
         if self._steps % self.every == 0:
-            self.kept.append(self._seen(frames, privileged))
+            seen: dict[str, Features] = {}
+            if self.student is not None:
+                with torch.inference_mode():
+                    seen[LATENT] = self.student.read(torch.from_numpy(frames))[1].numpy()
+            seen[HISTORY] = frames.reshape(len(frames), -1).copy()
+            seen |= {NEWEST: frames[:, -1].copy(), PRIVILEGED: np.array(privileged)}
+            self.kept.append(seen)
         self._steps += 1
         return self.policy.act(observation, privileged)
-
-    def _seen(self, frames: Features, privileged: Features) -> dict[str, Features]:
-        seen = {
-            HISTORY: frames.reshape(len(frames), -1).copy(),
-            NEWEST: frames[:, -1].copy(),
-            PRIVILEGED: np.array(privileged),
-        }
-        if self.student is None:
-            return seen
-        with torch.inference_mode():
-            _, latent = self.student.read(torch.from_numpy(frames))
-        return {LATENT: latent.numpy(), **seen}
-
-
-def probe_episodes(recipe: Recipe) -> list[Episode]:
-    """The trials of `eval.probe`, lightest first. Raises ValueError where the recipe has none."""
-    probe = recipe.eval.probe
-    if probe is None:
-        raise ValueError("the recipe has no eval.probe")
-    held = ({} if recipe.eval.disturbances else dict(UNDISTURBED)) | probe.fixed
-    if probe.partner_share is not None:
-        held["partner_share"] = probe.partner_share
-    script, masses = command_script(probe.sequence, recipe.task.commands), np.linspace(*probe.masses, probe.trials)
-    return [
-        planned_episode(probe.scene, script, mass, probe.seed + number, held)
-        for number, mass in enumerate(masses.tolist())
-    ]
 
 
 def read(
@@ -111,16 +88,22 @@ def read(
     interrupted: Callable[[], bool] = lambda: False,
     progress: Callable[[float], None] = lambda seconds: None,
 ) -> ProbeReadings:
-    """Play the trials of `eval.probe` and record features until each ends. Raises Interrupted when interrupted."""
-    recipe = world.recipe
-    episodes, probe = probe_episodes(recipe), recipe.eval.probe
+    """Play the trials of `eval.probe`, lightest first, and record features until each ends. Raises Interrupted when
+    interrupted."""
+    recipe, probe = world.recipe, world.recipe.eval.probe
     assert probe is not None
+    held = held_fixed(None, disturbed=recipe.eval.disturbances) | probe.fixed
+    held |= held_fixed(probe.partner_share, disturbed=True)
+    script, masses = command_script(probe.sequence, recipe.task.commands), np.linspace(*probe.masses, probe.trials)
+    episodes = [
+        planned_episode(probe.scene, script, mass, probe.seed + number, held)
+        for number, mass in enumerate(masses.tolist())
+    ]
     frequency = recipe.task.control_frequency
     listener = RecordingPolicy(policy, len(episodes), math.ceil(probe.interval * frequency), recipe.distill.history)
     outcomes = play_episodes(world, episodes, listener, workers=workers, interrupted=interrupted, progress=progress)
     times = np.arange(len(listener.kept)) * listener.every / frequency
     going = times[:, None] < np.array([outcome.seconds for outcome in outcomes])
-    masses = np.array([episode.fixed["object_mass"] for episode in episodes])
     return gathered(listener.kept, going, times, masses, listener.length / frequency)
 
 

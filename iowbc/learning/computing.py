@@ -44,17 +44,13 @@ class ParallelBatch:
         return list(map(function, parts) if self._pool is None else self._pool.map(function, parts))
 
 
-def has_bfloat16() -> bool:
-    """True where the processor multiplies in bfloat16 (avx512_bf16 or amx); without, it is emulated and slower."""
-    known = torch.cpu.get_capabilities()
-    return bool(known.get("avx512_bf16") or known.get("amx_bf16"))
-
-
 def reduced(precision: Precision) -> AbstractContextManager[None]:
-    """Context in which layers multiply in bfloat16: if `precision` says so, or for "auto" if the processor can.
+    """Context in which layers multiply in bfloat16: if `precision` says so, or for "auto" if the processor can
+    (avx512_bf16 or amx); without, it is emulated and slower.
 
     Torch's cache of converted weights is off. All threads share it and any of them empties it; a layer used twice would
     then sometimes sum its gradients in bfloat16.
     """
-    wanted = precision == "bfloat16" or (precision == "auto" and has_bfloat16())
+    able = any(torch.cpu.get_capabilities().get(name) for name in ("avx512_bf16", "amx_bf16"))
+    wanted = precision == "bfloat16" or (precision == "auto" and able)
     return torch.autocast("cpu", torch.bfloat16, enabled=wanted, cache_enabled=False)

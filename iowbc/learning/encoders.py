@@ -1,6 +1,6 @@
 """The student's encoder from a history of observations to a latent, and the estimate of s_priv from it."""
 
-from typing import Literal
+from typing import cast
 
 import torch
 from torch import Tensor, nn
@@ -8,8 +8,6 @@ from torch import Tensor, nn
 from iowbc.learning.activations import ACTIVATIONS
 from iowbc.learning.symmetric import SymmetricHead
 from iowbc.robot.mirror import MirrorMap
-
-EncoderName = Literal["mlp"]
 
 
 class MlpEncoder(nn.Module):
@@ -62,10 +60,7 @@ class PrivilegedEstimate(nn.Module):
             nn.init.zeros_(parameter)
 
     def forward(self, latent: Tensor) -> Tensor:
-        estimate: Tensor
-        if self.symmetric:
-            own, image = latent.chunk(2, dim=-1)
-            estimate = self.head(own + image, own - image)
-        else:
-            estimate = self.head(latent)
-        return estimate
+        if not self.symmetric:
+            return cast(Tensor, self.head(latent))
+        own, image = latent.chunk(2, dim=-1)
+        return cast(Tensor, self.head(own + image, own - image))

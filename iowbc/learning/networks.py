@@ -7,7 +7,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from iowbc.learning.encoders import EncoderName, MirroredEncoder, MlpEncoder, PrivilegedEstimate
+from iowbc.learning.encoders import MirroredEncoder, MlpEncoder, PrivilegedEstimate
 from iowbc.learning.perceptron import DenseMlp, VectorPerceptron
 from iowbc.learning.symmetric import SymmetricMlp, paired
 from iowbc.robot.mirror import MirrorMap, side_by_side
@@ -114,7 +114,7 @@ class StudentNetwork(nn.Module):
         hidden: Sequence[int],
         activation: str,
         clip: float,
-        encoder: EncoderName = "mlp",
+        encoder: str = "mlp",
         mirrors: Any = None,
         privileged: Any = None,
     ) -> None:

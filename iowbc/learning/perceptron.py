@@ -66,21 +66,15 @@ class VectorPerceptron(Perceptron):
         return prepared if self.seen is None else prepared * self.seen
 
 
-def mlp(sizes: Sequence[int], activation: str) -> nn.Sequential:
-    """Linear layers of the given sizes with an activation between them; the last one is linear."""
-    layers: list[nn.Module] = []
-    for inputs, outputs in itertools.pairwise(sizes):
-        layers += [nn.Linear(inputs, outputs), ACTIVATIONS[activation].module()]
-    return nn.Sequential(*layers[:-1])
-
-
 class DenseMlp(VectorPerceptron):
     """Perceptron without symmetry."""
 
     def __init__(self, inputs: int, hidden: Sequence[int], outputs: int, activation: str) -> None:
         super().__init__()
-        *layers, self.last = mlp([inputs, *hidden, outputs], activation)
-        self.layers = nn.Sequential(*layers)
+        self.layers = nn.Sequential()
+        for before, units in itertools.pairwise([inputs, *hidden]):
+            self.layers.extend([nn.Linear(before, units), ACTIVATIONS[activation].module()])
+        self.last = nn.Linear([inputs, *hidden][-1], outputs)
 
     def hidden(self, prepared: Tensor) -> Hidden:
         return (self.layers(self.looked_at(prepared)),)

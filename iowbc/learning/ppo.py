@@ -8,8 +8,7 @@ KL divergence; the standard deviation has its own learning rate and bounds.
 
 import copy
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +27,7 @@ from iowbc.learning.networks import Mirrors, mirrors_as_json
 from iowbc.learning.normalization import Normalization
 from iowbc.learning.policy import ActorCritic
 from iowbc.learning.rollout import Samples, neighbours
-from iowbc.learning.symmetry import MirroredSamples, half_mirrored
+from iowbc.learning.symmetry import half_mirrored, mirror_images
 from iowbc.recipe.skill.skill import SkillLearning
 from iowbc.recipe.teacher import Teacher
 from iowbc.rollouts.blocks import block_size
@@ -59,7 +58,7 @@ class Learner:
         for the value network only; `device`: torch device of the networks."""
         set_random_seed(seed)
         env.seed(seed)
-        self.settings, self.env, self.device = teacher, env, torch.device(device)
+        self.settings, self.env, self.mirrors, self.device = teacher, env, mirrors, torch.device(device)
         self._on_cpu = self.device.type == "cpu"
         self.in_parallel = ParallelBatch(teacher.parts if self._on_cpu else 1, cores)
         self._arguments = _policy_arguments(teacher, env, mirrors, value_only)
@@ -73,7 +72,6 @@ class Learner:
         self.samples = Samples(teacher.rollout, env.num_envs, inputs, actions, self.device)
         size, mirror = len(self.policy.normalizer.mean), None if teacher.symmetry == "none" else mirrors[0]
         self.normalization = Normalization(size, env.num_envs, teacher.gamma, mirror)
-        self.mirrored = MirroredSamples(mirrors, teacher.mirror_gap) if teacher.symmetry == "augment" else None
         self.observation: Array | None = None
         """Rows before the next step; None before the first rollout."""
         self.steps = 0
@@ -117,30 +115,26 @@ class Learner:
     def _batch(self) -> int:
         return self.settings.environments * self.settings.rollout // self.settings.minibatches
 
-    @contextmanager
-    def _timed(self, part: str) -> Iterator[None]:
-        begin = time.perf_counter()
-        yield
-        self.seconds[part] += time.perf_counter() - begin
-
     def collect(self) -> None:
         """Collect one rollout into the samples. Its observations are normalised by statistics of earlier rollouts."""
         policy, env, settings = self.policy, self.env, self.settings
         if self.observation is None:
             self.observation = env.reset()
         self.normalization.frozen = self.steps >= settings.statistics_until
-        with self._timed("simulation"), torch.inference_mode():
+        begin = time.perf_counter()
+        with torch.inference_mode():
             self.normalization.move(policy.normalizer)
             acting = policy if self._on_cpu else copy.deepcopy(policy).cpu()
             noise = torch.randn(settings.rollout, env.num_envs, len(acting.log_std)) * torch.exp(acting.log_std)
             rollout_policy = ExploringPolicy(acting_policy(acting), noise.numpy(), block_size(env.num_envs))
             found = env.roll(rollout_policy, settings.rollout)
-        self.seconds["simulation"] -= found.acting
+        rolled = time.perf_counter()
+        self.seconds["simulation"] += rolled - begin - found.acting
         self.seconds["inference"] += found.acting
         self.steps += settings.rollout * env.num_envs
         self.observation = found.observation[-1]
-        with self._timed("learning"):
-            self._process_rollout(found)
+        self._process_rollout(found)
+        self.seconds["learning"] += time.perf_counter() - rolled
 
     def _process_rollout(self, found: Trajectories) -> None:
         """Add the policy's outputs, values and advantages of a rollout to the samples."""
@@ -189,11 +183,7 @@ class Learner:
 
     def train(self) -> dict[str, float]:
         """Gradient steps on the samples; returns their statistics."""
-        with self._timed("learning"):
-            return self._train()
-
-    def _train(self) -> dict[str, float]:
-        settings, optimizer = self.settings, self.policy.optimizer
+        settings, optimizer, begin = self.settings, self.policy.optimizer, time.perf_counter()
         rate = self.learning_rate if self._policy_learns else settings.learning_rate
         moved = float(self._policy_learns)
         rates = (moved * rate, rate, moved * settings.std_learning_rate)
@@ -201,10 +191,11 @@ class Learner:
             group["lr"] = own
         before = self.policy.log_std.detach().clone()
         samples = self.samples.flat
-        images = None if self.mirrored is None else self.mirrored.images(self.samples, self.policy)
+        augment = settings.symmetry == "augment"
+        images = mirror_images(self.samples, self.policy, self.mirrors, settings.mirror_gap) if augment else samples
         found: list[Tensor] = []
         for _ in range(settings.epochs):
-            rows = samples if images is None else half_mirrored(samples, images)
+            rows = half_mirrored(samples, images) if augment else samples
             shuffled = torch.index_select(rows, 0, torch.randperm(len(rows)).to(self.device))
             found += [self._gradient_step(batch, before) for batch in torch.split(shuffled, self._batch)]
         every = torch.stack(found).view(settings.epochs, -1, len(FIGURES))
@@ -214,6 +205,7 @@ class Learner:
         values |= {"std": float(torch.exp(self.policy.log_std.detach()).mean()), "learning_rate": rate}
         if self._policy_learns:
             self.learning_rate = adapted(rate, last["kl"], settings, self.caution)
+        self.seconds["learning"] += time.perf_counter() - begin
         return {f"train/{name}": value for name, value in values.items()}
 
     @property
@@ -221,7 +213,8 @@ class Learner:
         return self.steps > self.value_alone
 
     def _gradient_step(self, batch: Tensor, before: Tensor) -> Tensor:
-        """One step of the optimiser on a minibatch of rows; returns `FIGURES`. `before`: log std before the update."""
+        """One step of the optimiser on a minibatch of rows, within the bounds of the standard deviation; returns
+        `FIGURES`. `before`: log std before the update."""
         policy, size = self.policy, len(batch)
         parameters = [*policy.actor.parameters(), *policy.critic.parameters(), policy.log_stds]
         advantage = self.samples.named(batch)["advantage"]
@@ -237,7 +230,9 @@ class Learner:
             parameter.grad = torch.stack(parts).sum(0) if len(parts) > 1 else parts[0]
         torch.nn.utils.clip_grad_norm_(parameters, self.settings.gradient_norm)
         policy.optimizer.step()
-        self._bound_deviation()
+        low, high = deviation_bounds(self.settings, self.steps)
+        with torch.no_grad():
+            policy.log_stds.clamp_(float(np.log(low)), float(np.log(high)))
         return torch.stack(figures).sum(0)
 
     def _loss(self, samples: dict[str, Tensor], before: Tensor) -> tuple[Tensor, Tensor]:
@@ -262,12 +257,6 @@ class Learner:
             figures = torch.stack([policy_loss, value_loss, kl, sampled, share])
         return loss, figures
 
-    def _bound_deviation(self) -> None:
-        """Clamp the standard deviation between its floor and its ceiling, which decays with the steps."""
-        low, high = deviation_bounds(self.settings, self.steps)
-        with torch.no_grad():
-            self.policy.log_stds.clamp_(float(np.log(low)), float(np.log(high)))
-
 
 def _policy_arguments(teacher: Teacher, env: Any, mirrors: Mirrors, value_only: Sequence[int]) -> dict[str, Any]:
     """Arguments of `ActorCritic` other than its spaces and learning rate."""
@@ -289,7 +278,7 @@ def _policy_arguments(teacher: Teacher, env: Any, mirrors: Mirrors, value_only: 
 
 
 def deviation_bounds(teacher: Teacher, steps: int) -> tuple[float, float]:
-    """Bounds of the action's standard deviation after `steps` environment steps."""
+    """Bounds of the action's standard deviation after `steps` environment steps: a floor, and a ceiling that decays."""
     restart = teacher.restart
     if restart is not None and steps >= restart.after:
         ceiling = restart.std * 0.5 ** ((steps - restart.after) / restart.half_life)

@@ -1,6 +1,7 @@
 """Trained networks on disk: safetensors for the weights, JSON for the architecture, no pickle."""
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -26,37 +27,26 @@ def save_network(
     (folder / f"{name}.json").write_text(text + "\n")
 
 
-def load_network(folder: Path) -> tuple[Network, dict[str, Any]]:
-    """Load the network of a stage's artifact; returns it in evaluation mode, and the JSON."""
-    path = next((folder / f"{name}.json" for name in NAMES if (folder / f"{name}.json").is_file()), None)
+def load_network(folder: Path, names: Sequence[str] = NAMES) -> tuple[Network, dict[str, Any]]:
+    """Load the network of a stage's artifact, the first of these base names; returns it in evaluation mode, and the
+    JSON."""
+    path = next((folder / f"{name}.json" for name in names if (folder / f"{name}.json").is_file()), None)
     if path is None:
         found = sorted(p.name for p in folder.glob("*.json"))
-        wanted = " or ".join(f"{name}.json" for name in NAMES)
+        wanted = " or ".join(f"{name}.json" for name in names)
         raise FileNotFoundError(f"{folder}: no {wanted} there; the folder holds {found}")
-    return read_network(folder, path.stem)
-
-
-def read_network(folder: Path, name: str) -> tuple[Network, dict[str, Any]]:
-    """Load a network by name; returns it in evaluation mode, and the JSON."""
-    about = json.loads((folder / f"{name}.json").read_text())
+    about = json.loads(path.read_text())
     network = KINDS[about["kind"]](**about["architecture"])
-    network.load_state_dict(load_file(folder / f"{name}.safetensors"))
+    network.load_state_dict(load_file(path.with_suffix(".safetensors")))
     network.requires_grad_(False)
     return network.eval(), about
 
 
-def load_teacher(folder: Path) -> tuple[TeacherNetwork, dict[str, Any]]:
-    """The teacher in a stage's artifact."""
-    network, about = load_network(folder)
+def load_teacher(folder: Path, name: str = "teacher") -> tuple[TeacherNetwork, dict[str, Any]]:
+    """The network of a kind of teacher in a stage's artifact, and the JSON."""
+    network, about = load_network(folder, (name,))
     assert isinstance(network, TeacherNetwork)
     return network, about
-
-
-def read_teacher(folder: Path, name: str) -> TeacherNetwork:
-    """Load a teacher's network by name."""
-    network, _ = read_network(folder, name)
-    assert isinstance(network, TeacherNetwork)
-    return network
 
 
 def load_student_network(folder: Path) -> tuple[StudentNetwork, dict[str, Any]]:

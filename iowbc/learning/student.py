@@ -12,8 +12,7 @@ from torch import Tensor
 
 from iowbc.learning import checkpoint
 from iowbc.learning.as_numpy import student_policy, teacher_policy
-from iowbc.learning.distillation import ReplayBuffer, mirror_half, spread
-from iowbc.learning.distillation_loss import DistillationLoss, Symmetry
+from iowbc.learning.distillation import DistillationLoss, ReplayBuffer, Symmetry, mirror_half, spread
 from iowbc.learning.environments import Environments
 from iowbc.learning.networks import StudentNetwork, TeacherNetwork, mirror_as_json, mirrors_as_json
 from iowbc.recipe.distillation import Distillation

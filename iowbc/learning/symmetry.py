@@ -16,32 +16,26 @@ def mirror_tensor(mirror: MirrorMap, x: Tensor) -> Tensor:
     return x[..., torch.from_numpy(mirror.permutation)] * torch.from_numpy(mirror.sign.astype(np.float32)).to(x.device)
 
 
-class MirroredSamples:
-    """Mirror images of a rollout's samples.
+def mirror_images(samples: Samples, policy: ActorCritic, mirrors: Mirrors, gap: float) -> Tensor:
+    """The mirror image of every sample; the sample itself where its image is too unlikely.
 
     Advantage and return equal those of the original, since the task is symmetric. Mean and density are recomputed in
     the mirrored state, so that the probability ratio starts at one. Images with a very unlikely action are not used:
-    their gradient would grow without bound.
+    their gradient would grow without bound. `mirrors`: of observation and action; `gap`: largest drop of log density
+    from original to image [nat].
     """
-
-    def __init__(self, mirrors: Mirrors, gap: float) -> None:
-        """`mirrors`: of observation and action; `gap`: largest drop of log density from original to image [nat]."""
-        self.mirrors, self.gap = mirrors, gap
-
-    def images(self, samples: Samples, policy: ActorCritic) -> Tensor:
-        """The mirror image of every sample; the sample itself where its image is too unlikely."""
-        rows = samples.flat
-        images = rows.clone()
-        old, new = samples.named(rows), samples.named(images)
-        with torch.no_grad():
-            new["observation"].copy_(mirror_tensor(self.mirrors[0], old["observation"]))
-            for name in ("action", "neighbours"):
-                new[name].copy_(mirror_tensor(self.mirrors[1], old[name]))
-            new["mean"].copy_(policy.actor.head(policy.actor.hidden(new["observation"])))
-            new["log_density"].copy_(log_density(new["action"], new["mean"], policy.log_std))
-        unlikely = new["log_density"] < old["log_density"] - self.gap
-        images[unlikely] = rows[unlikely]
-        return images
+    rows = samples.flat
+    images = rows.clone()
+    old, new = samples.named(rows), samples.named(images)
+    with torch.no_grad():
+        new["observation"].copy_(mirror_tensor(mirrors[0], old["observation"]))
+        for name in ("action", "neighbours"):
+            new[name].copy_(mirror_tensor(mirrors[1], old[name]))
+        new["mean"].copy_(policy.actor.head(policy.actor.hidden(new["observation"])))
+        new["log_density"].copy_(log_density(new["action"], new["mean"], policy.log_std))
+    unlikely = new["log_density"] < old["log_density"] - gap
+    images[unlikely] = rows[unlikely]
+    return images
 
 
 def half_mirrored(samples: Tensor, images: Tensor) -> Tensor:

@@ -89,12 +89,13 @@ class TeacherTraining:
         """Finite statistics of an update and its check; rolls back if they show a collapse."""
         figures = {name: value for name, value in training.items() if np.isfinite(value)}
         deviation, floor = self.model.policy.log_std.detach().exp(), self.settings.std_floor
+        updates = self.steps // (self.settings.environments * self.settings.rollout)
         why = ""
         if len(figures) < len(training) or not self.model.policy.finite():
             why = "the networks diverged"
         elif float(deviation.mean()) <= FLOOR_REACHED * floor < COLLAPSED_SHARE * self.settings.std_end:
             why = "exploration died out"
-        elif self.score is not None and self._updates % (self.settings.check.every or 1) == 0:
+        elif self.score is not None and updates % (self.settings.check.every or 1) == 0:
             found = {f"check/{name}": float(value) for name, value in self.score(policy_of(*self.network())).items()}
             figures |= found
             if self.best.collapsed(found["check/score"]):
@@ -107,10 +108,6 @@ class TeacherTraining:
             self.model.learning_rate = max(low, self.settings.check.caution * self.model.learning_rate)
             self.say(f"{why} at {self.steps:,} steps: goes back to the best policy, with smaller steps")
         return figures | {"rollbacks": float(self.best.rollbacks)}
-
-    @property
-    def _updates(self) -> int:
-        return self.steps // (self.settings.environments * self.settings.rollout)
 
     def keep_best(self) -> None:
         """End the training: score the last policy, then restore the best learner state."""

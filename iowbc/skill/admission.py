@@ -1,6 +1,7 @@
 """Admission of transport tasks: a task must need two agents that respond to each other."""
 
 from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import dataclass
 
 import numpy as np
@@ -68,7 +69,7 @@ def admissions(
         for human, rule in PAIRS.values()
         for seed in range(trials)
     ]
-    with TransportGame(specification, student, n=len(plans), workers=workers, plans=plans) as game:
+    with closing(TransportGame(specification, student, n=len(plans), workers=workers, plans=plans)) as game:
         figures = play_once(game, NOMINAL)
 
     def means(name: str, own: Mask) -> dict[str, float]:

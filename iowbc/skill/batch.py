@@ -83,7 +83,7 @@ class GameBatch:
         for name in ("reward", "terminated", "truncated"):
             self.buffers[name][:] = 0
         self._begin(np.arange(self.n))
-        self._observe("now")
+        self._observe()
 
     def step(self) -> None:
         """One decision of every game, with `substeps` control steps; ended games restart."""
@@ -139,14 +139,14 @@ class GameBatch:
         self._total += buffers["reward"]
         self._touched += touched
         buffers["terminated"][:], buffers["truncated"][:] = end.terminated, end.time_out
-        self._observe("now")
+        self._observe()
         for name, _ in seen.sizes(self._skill):
             buffers[f"final/{name}"][:] = buffers[f"now/{name}"]
         which = np.flatnonzero(end.terminated | end.time_out)
         if len(which):
             self._write_figures(which, end)
             self._begin(which)
-            self._observe("now")
+            self._observe()
 
     def _begin(self, which: Indices) -> None:
         """New episodes in some games, (k,)."""
@@ -227,7 +227,7 @@ class GameBatch:
             touched |= np.abs(lateral) > self.paths.half_width(task, covered)
         return touched
 
-    def _observe(self, time: str) -> None:
+    def _observe(self) -> None:
         lower, drawn, now, ahead = self.lower, self.drawn, self.now, self._skill.pursuit.waypoints
         path = seen.waypoints(self.paths, now, ahead, now.heading)
         thing = of_object(lower.simulation.measured, self._sees_object)
@@ -243,8 +243,8 @@ class GameBatch:
         secret = seen.hidden(lower.simulation, lower.moved, left, drawn.acts)
         human = joined(felt)
         self._nominals = self._command(thing[:, YAW])
-        self.buffers[f"{time}/robot"][:], self.buffers[f"{time}/human"][:] = robot, human
-        self.buffers[f"{time}/state"][:] = np.concatenate([robot, human, joined(secret)], axis=1)
+        self.buffers["now/robot"][:], self.buffers["now/human"][:] = robot, human
+        self.buffers["now/state"][:] = np.concatenate([robot, human, joined(secret)], axis=1)
 
     def _write_figures(self, which: Indices, end: GameEnding) -> None:
         """Figures of the episodes that ended, (k,)."""

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 
@@ -159,12 +158,6 @@ class TransportGame:
     def _ask(self, messages: Sequence[Message]) -> None:
         self._workers.ask(messages)
         self._workers.answers()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *ended: object) -> None:
-        self.close()
 
 
 def play_once(

@@ -221,13 +221,10 @@ class SkillTraining:
         """Gradient steps of the robot's policy towards its privileged actions in all rollouts so far; returns the mean
         squared error in the newest rollout, before the steps."""
         robot, settings = self.agents[ROBOT], self.settings
-        seen, wanted = self.imitated["observation"], self.imitated["action"]
         with torch.inference_mode():
             error = float(torch.nn.functional.mse_loss(samples[f"{ROBOT}/mean"], samples["privileged"]))
-        self.imitated = {
-            "observation": torch.cat([seen, samples[f"{ROBOT}/raw"]]),
-            "action": torch.cat([wanted, samples["privileged"]]),
-        }
+        newest = {"observation": samples[f"{ROBOT}/raw"], "action": samples["privileged"]}
+        self.imitated = {name: torch.cat([self.imitated[name], values]) for name, values in newest.items()}
         robot.rate, before = settings.imitation_rate, robot.rate
         for _ in range(settings.imitation_gradient_steps):
             batch = torch.randint(len(self.imitated["action"]), (IMITATION_BATCH,))
@@ -248,11 +245,10 @@ class SkillTraining:
 
     def arrays(self) -> Arrays:
         """Training state for resuming, between two updates."""
-        networks = [prefixed(name, each.arrays()) for name, each in self.trained.items()]
         whole: Arrays = {"steps": np.array([self.steps]), **prefixed("random", checkpoint.random_arrays())}
         whole |= prefixed("imitated", {name: values.numpy() for name, values in self.imitated.items()})
-        for arrays in networks:
-            whole |= arrays
+        for name, each in self.trained.items():
+            whole |= prefixed(name, each.arrays())
         return whole
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:

@@ -77,12 +77,10 @@ def mean_actions(
     networks: Mapping[str, TeacherNetwork | None], observations: Mapping[str, Values], sizes: Mapping[str, int]
 ) -> dict[str, Values]:
     """Mean action of each agent's policy, (n, size), within its bounds; zero, the nominal action, without a policy."""
-    found: dict[str, Values] = {}
-    for agent, network in networks.items():
-        seen = observations[agent]
-        if network is None:
-            found[agent] = np.zeros((len(seen), sizes[agent]), np.float32)
-            continue
-        with torch.inference_mode():
-            found[agent] = network(torch.from_numpy(seen)).clamp(-1.0, 1.0).numpy()
-    return found
+    with torch.inference_mode():
+        return {
+            agent: np.zeros((len(observations[agent]), sizes[agent]), np.float32)
+            if network is None
+            else network(torch.from_numpy(observations[agent])).clamp(-1.0, 1.0).numpy()
+            for agent, network in networks.items()
+        }

@@ -60,7 +60,7 @@ def run(job: Job) -> None:
     import pandas as pd
     import torch
 
-    from iowbc.learning.storage import read_teacher
+    from iowbc.learning.storage import load_teacher
     from iowbc.pipeline.store.artifact import RECIPE
     from iowbc.pipeline.store.runs import read_yaml
     from iowbc.results.picture import write_figure
@@ -74,7 +74,7 @@ def run(job: Job) -> None:
     recipe, skill = job.recipe, job.recipe.skill
     world = Specification(recipe, job.robot, job.inputs.get("rg-fit")).deployed
     student = load_student(job.inputs[policy_stage(recipe)])
-    human = read_teacher(job.inputs["skill"], "human") if "skill" in job.inputs else None
+    human = load_teacher(job.inputs["skill"], "human")[0] if "skill" in job.inputs else None
     lower = {"": (world, student)}
     for label in skill.eval.controllers:
         folder, rg = job.inputs[f"{label}/distill"], job.inputs[f"{label}/rg-fit"]
@@ -100,7 +100,7 @@ def run(job: Job) -> None:
 
 
 def _competitors(job: Job) -> "list[Competitor]":
-    from iowbc.learning.storage import read_teacher
+    from iowbc.learning.storage import load_teacher
     from iowbc.skill.evaluation.games import Competitor
 
     asked = job.recipe.skill.eval
@@ -109,7 +109,7 @@ def _competitors(job: Job) -> "list[Competitor]":
         skills += [(label, str(place), f"{label}/{place}", "") for place in range(len(several))]
     skills += [(f"{asked.label} on {label}", "own", "skill", label) for label in asked.controllers]
     trained = [
-        Competitor(label, training, None, read_teacher(job.inputs[name], "robot"), controller)
+        Competitor(label, training, None, load_teacher(job.inputs[name], "robot")[0], controller)
         for label, training, name, controller in skills
     ]
     return trained + [Competitor(RIVALS[rule], "", None if rule == "nominal" else rule, None) for rule in asked.rivals]

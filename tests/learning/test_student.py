@@ -9,7 +9,7 @@ import pytest
 import torch
 from point_masses import MIRRORS, PointMasses
 
-from iowbc.learning.distillation_loss import DistillationLoss, Symmetry
+from iowbc.learning.distillation import DistillationLoss, Symmetry
 from iowbc.learning.networks import StudentNetwork, TeacherNetwork, mirror_as_json
 from iowbc.learning.storage import load_network, save_network
 from iowbc.learning.student import Rows, StudentTraining

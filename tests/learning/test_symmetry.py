@@ -13,7 +13,7 @@ from iowbc.learning.normalization import SymmetricMeanStd
 from iowbc.learning.policy import ActorCritic
 from iowbc.learning.rollout import Samples
 from iowbc.learning.symmetric import MirrorBasis, SymmetricLayers
-from iowbc.learning.symmetry import MirroredSamples, half_mirrored, mirror_tensor
+from iowbc.learning.symmetry import half_mirrored, mirror_images, mirror_tensor
 from iowbc.robot.mirror import MirrorMap
 
 OBSERVATION = MirrorMap(np.array([1, 0, 2, 3, 5, 4]), np.array([1, 1, -1, 1, -1, -1], np.float32))
@@ -181,7 +181,7 @@ def test_samples_are_shown_or_their_whole_images_but_no_image_that_is_too_unlike
     with torch.no_grad():
         there = policy.get_distribution(mirror_tensor(OBSERVATION, old["observation"][0])).log_prob(image)
     old["log_density"][0], old["log_density"][1] = there + 1.0, 1e3
-    images = MirroredSamples((OBSERVATION, ACTION), gap=3.0).images(rollout, policy)
+    images = mirror_images(rollout, policy, (OBSERVATION, ACTION), gap=3.0)
     new = rollout.named(images)
     torch.testing.assert_close(new["action"][:1], image)
     torch.testing.assert_close(new["neighbours"][:1], mirror_tensor(ACTION, old["neighbours"][0]))

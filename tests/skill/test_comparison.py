@@ -1,6 +1,7 @@
 """The games of `skill-eval`, and what its tables make of them."""
 
 import itertools
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -109,7 +110,7 @@ def test_all_competitors_play_the_same_episodes_and_finished_batches_are_kept(
         return pd.concat(play_batches(*asked, 0, tmp_path, lambda: stop))
 
     torch.manual_seed(0)
-    with TransportGame(world, student, n=1) as game:
+    with closing(TransportGame(world, student, n=1)) as game:
         size = game.observation_sizes["robot"]
     robot = TeacherNetwork(size, 11, [8], "elu", 5.0)
     own, rival = Competitor("MAPPO", "own", None, robot), Competitor("follower", "", "follow", None)

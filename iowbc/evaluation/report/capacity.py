@@ -83,15 +83,9 @@ def _table(
     name: str, caption: str, found: Capacities, columns: dict[str, str], unit: str, last: list[tuple[str, ...]]
 ) -> Table:
     """Table with a row per variant; `columns`: heads by suite or direction."""
-    rows = [
-        (variant, *(own[case].text(unit) if case in own else ABSENT for case in columns))
-        for variant, own in found.items()
-    ]
-    numbers = [
-        (variant, case, own[case].value, own[case].open_ended)
-        for variant, own in found.items()
-        for case in columns
-        if case in own
-    ]
+    rows, numbers = [], []
+    for variant, own in found.items():
+        rows.append((variant, *(own[case].text(unit) if case in own else ABSENT for case in columns)))
+        numbers += [(variant, case, own[case].value, own[case].open_ended) for case in columns if case in own]
     frame = pd.DataFrame(numbers, columns=["variant", "of", "value", "open"])
     return Table(name, caption, heads("Variant", *columns.values()), [*rows, *last], frame, grouped=False)

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
@@ -30,9 +29,6 @@ LABELS = {
     "E_v": "$E_v$, velocity [m/s]",
     "E_psi": "$E_\\psi$, heading [rad]",
 }
-MARKS = "means over the trials survived; at the upper edge: how many where not all survived, × none"
-STILL_NOTE = "grey: a robot that stands still"
-PAPER_NOTE = "hollow, dotted: the paper's numbers, for its own commands; the friction of its crates is unknown"
 PANEL_WIDTH, SMALLEST_WIDTH = 3.75, 7.5
 """Width of a panel of the comparison, and minimum width of the whole figure [inch]."""
 VARIANTS_PER_PANEL = 4
@@ -174,7 +170,9 @@ def _with_paper(rows: pd.DataFrame) -> bool:
 
 def _note(with_paper: bool) -> str:
     """The meaning of marks, grey lines and dotted ones."""
-    return f"{MARKS}\n{'; '.join([PAPER_NOTE] * with_paper + [STILL_NOTE])}"
+    marks = "means over the trials survived; at the upper edge: how many where not all survived, × none"
+    paper = "hollow, dotted: the paper's numbers, for its own commands; the friction of its crates is unknown; "
+    return f"{marks}\n{paper * with_paper}grey: a robot that stands still"
 
 
 def _sweep_panel(
@@ -238,19 +236,12 @@ def _capacity_bars(axes: Axes, found: Capacities, names: Sequence[str]) -> None:
 
 def _mark_survivors(axes: Axes, rows: pd.DataFrame, place: int, colour: str) -> None:
     """Mark masses that not all trials survived at the upper edge, one line per variant: survivors, or a cross."""
-    transform, height = axes.get_xaxis_transform(), 0.98 - FAILURE_SPACING * place
-    failed = rows[rows["survived"] == 0]["mass"]
-    crosses = axes.plot(failed, [height] * len(failed), "x", color=colour, transform=transform, clip_on=False)
-    text: dict[str, Any] = {"color": colour, "transform": transform, "ha": "center", "va": "center", "fontsize": 7}
-    marks: list[Artist] = [
-        *crosses,
-        *(
-            axes.text(float(row.mass), height, f"{row.survived}/{row.trials}", **text)
-            for row in rows[(rows["survived"] > 0) & (rows["survived"] < rows["trials"])].itertuples()
-        ),
-    ]
-    for mark in marks:
-        mark.set_in_layout(False)
+    style: dict[str, Any] = {"color": colour, "transform": axes.get_xaxis_transform(), "in_layout": False}
+    height, failed = 0.98 - FAILURE_SPACING * place, rows[rows["survived"] == 0]["mass"]
+    axes.plot(failed, [height] * len(failed), "x", clip_on=False, **style)
+    for row in rows[(rows["survived"] > 0) & (rows["survived"] < rows["trials"])].itertuples():
+        count = f"{row.survived}/{row.trials}"
+        axes.text(float(row.mass), height, count, ha="center", va="center", fontsize=7, **style)
 
 
 def _from_zero(axes: Axes) -> None:

@@ -4,7 +4,6 @@ Trials of one number share the same world (random draws and commands) at every m
 training. They form a cluster, and the number of worlds determines the precision.
 """
 
-import functools
 import math
 from typing import NamedTuple
 
@@ -66,14 +65,10 @@ def sign_flip_p(differences: NDArray[np.int64]) -> float:
     """
     sizes = np.abs(differences[differences != 0])
     total, observed = int(sizes.sum()), abs(int(differences.sum()))
-    chances = functools.reduce(_flipped, sizes.tolist(), np.ones(1))
-    sums = np.arange(-total, total + 1)
+    sums, chances = np.arange(-total, total + 1), np.ones(1)
+    for size in sizes.tolist():
+        chances = 0.5 * (np.pad(chances, (0, 2 * size)) + np.pad(chances, (2 * size, 0)))
     return min(1.0, float(chances[np.abs(sums) >= observed].sum()))
-
-
-def _flipped(chances: NDArray[np.float64], size: int) -> NDArray[np.float64]:
-    """Distribution of a sum, -k to k, after adding a term of +size or -size."""
-    return 0.5 * (np.pad(chances, (0, 2 * size)) + np.pad(chances, (2 * size, 0)))
 
 
 def design_effect(successes: NDArray[np.bool_], worlds: NDArray[np.int64]) -> float:

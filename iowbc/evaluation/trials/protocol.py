@@ -17,8 +17,7 @@ from iowbc.evaluation.trials.plan import (
     planned_sweeps,
     push_trials,
 )
-from iowbc.evaluation.trials.policy_in_batch import PolicyInBatch
-from iowbc.evaluation.trials.rollout import play_episodes
+from iowbc.evaluation.trials.rollout import PolicyInBatch, play_episodes
 from iowbc.evaluation.trials.table import trial_row
 from iowbc.files import newest_checked, write_checked
 from iowbc.learning.acting import Policy, load_policy
@@ -51,10 +50,9 @@ def _with_trial_scenes(recipe: Recipe) -> Recipe:
     """The recipe with the scenes of `eval.scenes`, their grasps and loads."""
     further, simulation, task = recipe.eval.scenes, recipe.simulation, recipe.task
     references = task.references
-    grasps = {**dict(references.grasps), **{name: own.wrists for name, own in further.items()}}
-    usual = references.loads.lift
-    expected = {name: usual if own.load is None else own.load for name, own in further.items()}
-    loads = {**dict(references.loads), **expected}
+    usual, grasps, loads = references.loads.lift, dict(references.grasps), dict(references.loads)
+    grasps |= {name: own.wrists for name, own in further.items()}
+    loads |= {name: usual if own.load is None else own.load for name, own in further.items()}
     own = {"grasps": Grasps.model_validate(grasps), "loads": Loads.model_validate(loads)}
     scenes = {"scenes": with_scenes(simulation.scenes, further)}
     return recipe.model_copy(
@@ -129,23 +127,19 @@ class Protocol:
         return _in_order(pd.concat(tables, ignore_index=True), list(dict.fromkeys(trial.suite for trial in named)))
 
     def _round(self, number: int, trials: Sequence[Trial]) -> pd.DataFrame:
-        """Play trials in batches; returns their table."""
+        """Play trials in batches, if possible on other machines; returns their table."""
         self.total += len(trials)
         found = batched_by_duration(trials, self.world.recipe.eval.batch)
         batches = {f"trials-{number}-{place}": batch for place, batch in enumerate(found)}
         if self.elsewhere is not None:
-            self._play_elsewhere(self.elsewhere, batches)
+            missing = {name: own for name, own in batches.items() if newest_checked(self._file(name), name)[0] is None}
+            ready = self.done + len(trials) - sum(map(len, missing.values()))
+            for name, content in self.elsewhere(missing):
+                write_checked(self._file(name), name, content)
+                ready += len(missing[name])
+                self.progress(ready, self.total, _suites(missing[name]))
         tables = [self._batch(name, batch) for name, batch in batches.items()]
         return pd.concat(tables, ignore_index=True)
-
-    def _play_elsewhere(self, elsewhere: Callable[[Batches], Iterator[tuple[str, bytes]]], batches: Batches) -> None:
-        """Play the missing batches on other machines."""
-        missing = {name: batch for name, batch in batches.items() if newest_checked(self._file(name), name)[0] is None}
-        ready = sum(len(batch) for name, batch in batches.items() if name not in missing)
-        for name, content in elsewhere(missing):
-            write_checked(self._file(name), name, content)
-            ready += len(missing[name])
-            self.progress(self.done + ready, self.total, _suites(missing[name]))
 
     def _file(self, name: str) -> Path:
         """Cache file of a finished batch."""

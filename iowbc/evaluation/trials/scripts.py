@@ -85,10 +85,8 @@ class _Motions:
     def _walk(self, forward: float, left: float, turn: float) -> Array:
         ranges = self.ranges
         command = self._posture(self._stand())
-        for place, (value, (low, high)) in enumerate(
-            zip((forward, left, turn), (ranges.velocity_x, ranges.velocity_y, ranges.yaw_rate), strict=True)
-        ):
-            command[place] = min(max(value, low), high)
+        lowest, highest = zip(ranges.velocity_x, ranges.velocity_y, ranges.yaw_rate, strict=True)
+        command[:3] = np.clip((forward, left, turn), lowest, highest)
         return command
 
     def _posture(self, command: Array) -> Array:

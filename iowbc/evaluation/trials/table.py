@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from iowbc.arrays import Array
 from iowbc.evaluation.trials.metrics import trial_metrics
 from iowbc.evaluation.trials.plan import Trial
 from iowbc.evaluation.trials.trace import Outcome
@@ -15,8 +14,6 @@ from iowbc.recipe.export import Acceptance
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import Robot
 from iowbc.task.episodes import Episode
-
-COMPLIANCE, STAGNATION = "compliance", "stagnation"
 
 
 def trial_row(recipe: Recipe, robot: Robot, trial: Trial, outcome: Outcome) -> dict[str, Any]:
@@ -49,7 +46,10 @@ def trial_row(recipe: Recipe, robot: Robot, trial: Trial, outcome: Outcome) -> d
         "kept": metrics["object_beside"] <= recipe.eval.success.object_beside,
         "end": outcome.ending,
         **metrics,
-        **{f"drawn_{name}": _plain(values) for name, values in outcome.drawn.items()},
+        **{
+            f"drawn_{name}": values.item() if len(values) == 1 else values.tolist()
+            for name, values in outcome.drawn.items()
+        },
         "episode": json.dumps(episode.as_json()),
     }
 
@@ -67,13 +67,13 @@ def succeeded(success: Success, kind: str, metrics: dict[str, float], *, blocked
     slip, before a blocked crate (`blocked`) by a minimum push force with bounded hand force.
     """
     posture = metrics["E_alpha"] <= success.posture_pitch and metrics["E_h"] <= success.posture_height
-    if kind == STAGNATION:
+    if kind == "stagnation":
         pushes = metrics["push_force_share"] >= success.push_time
         return posture and pushes and metrics["foot_slip"] <= success.foot_slide * metrics["seconds"]
-    if kind == COMPLIANCE and blocked:
+    if kind == "compliance" and blocked:
         pushes = metrics["push_force"] >= success.least_push
         return posture and pushes and metrics["hand_force_p95"] <= success.hand_force
-    if kind == COMPLIANCE:
+    if kind == "compliance":
         bounded = not metrics["handle_force_p95"] > success.handle_force
         return bounded and transported(success, metrics, success.compliance_transport)
     return transported(success, metrics)
@@ -104,7 +104,3 @@ def _blocked(outcome: Outcome) -> bool:
     drawn, trace = outcome.drawn, outcome.trace
     hold = float(drawn["ground_friction"][0]) * float(trace.foot_load.sum(axis=1).mean())
     return float(drawn["rolling_resistance"][0]) > hold
-
-
-def _plain(values: Array) -> float | list[float]:
-    return float(values[0]) if len(values) == 1 else [float(value) for value in values]

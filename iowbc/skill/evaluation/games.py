@@ -2,6 +2,7 @@
 
 import itertools
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -68,7 +69,8 @@ def play_batches(
     """Rows of a competitor's episodes, batch by batch; finished batches are kept in `work`.
 
     `human`: the learnt one, the same for every competitor; `controller`: the world and student below the competitor;
-    `workers`: see `TransportGame`. Raises Interrupted when interrupted.
+    `workers`: see `TransportGame`. Raises Interrupted when interrupted, StageFailed if the competitor observes another
+    number of values than the games show.
     """
     for begin in range(0, len(planned), settings.games):
         batch = planned[begin : begin + settings.games]
@@ -76,8 +78,13 @@ def play_batches(
         path = work / f"{place.replace('/', '-').replace(' ', '_')}.parquet"
         if not path.is_file():
             plans = [replace(plan, rule=competitor.rule) for plan in batch]
-            with TransportGame(*controller, n=len(plans), workers=workers, plans=plans) as game:
-                _require_fitting(competitor, game.observation_sizes[ROBOT])
+            with closing(TransportGame(*controller, n=len(plans), workers=workers, plans=plans)) as game:
+                size = game.observation_sizes[ROBOT]
+                if competitor.robot is not None and (own := len(competitor.robot.normalizer.mean)) != size:
+                    raise StageFailed(
+                        f"skill.eval.others.{competitor.label}: that skill observes {own} numbers, this game shows "
+                        f"{size}; train it with the same `skill` section and code"
+                    )
                 figures = play_once(game, {ROBOT: competitor.robot, HUMAN: human}, interrupted)
             rows = pd.DataFrame(figures).assign(
                 label=competitor.label,
@@ -90,14 +97,6 @@ def play_batches(
             rows.to_parquet(partial, index=False)
             partial.rename(path)
         yield pd.read_parquet(path)
-
-
-def _require_fitting(competitor: Competitor, size: int) -> None:
-    """Raises StageFailed if the observation sizes of skill and games differ."""
-    if competitor.robot is not None and (own := len(competitor.robot.normalizer.mean)) != size:
-        text = f"that skill observes {own} numbers, this game shows {size}"
-        advice = "train it with the same `skill` section and code"
-        raise StageFailed(f"skill.eval.others.{competitor.label}: {text}; {advice}")
 
 
 def on_controller(world: Specification, label: str, own: Task, student: Student, rg: Path | None) -> Specification:

@@ -8,8 +8,8 @@ import pandas as pd
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from iowbc.evaluation.report.figures import draw_bars, finish
 from iowbc.evaluation.report.statistics import RESAMPLES, Bootstrapped, bootstrapped, interquartile_mean
-from iowbc.results.picture import COLOURS
 from iowbc.results.table import ABSENT, Cell, Table, heads
 
 FORCE, SUCCESS = "partner_force_p90", "success"
@@ -157,30 +157,17 @@ def figure(games: pd.DataFrame) -> Figure:
     kinds = [known for known in (True, False) if known in set(games["known"])]
     drawing = Figure(figsize=(11.0, 3.2 * len(kinds)), layout="constrained")
     grid = drawing.subplots(len(kinds), 2, squeeze=False)
-    width = 0.8 / len(labels)
     for axes, known in zip(grid, kinds, strict=True):
         partners = list(dict.fromkeys(games[games["known"] == known]["partner"]))
         for panel, (name, title) in zip(
             axes, ((FORCE, "partner force p90 [N]"), (SUCCESS, "success [share]")), strict=True
         ):
-            for place, label in enumerate(labels):
+            heights, intervals = {}, {}
+            for label in labels:
                 own = games[(games["label"] == label) & (games["known"] == known)]
                 found = [estimate(own[own["partner"] == partner], name, name == SUCCESS) for partner in partners]
                 value, low, high = np.array(found).T
-                panel.bar(
-                    np.arange(len(partners)) + (place - (len(labels) - 1) / 2) * width,
-                    value,
-                    width,
-                    yerr=(value - low, high - value),
-                    color=COLOURS[place % len(COLOURS)],
-                    label=label,
-                    capsize=2,
-                )
-            panel.set_xticks(range(len(partners)), partners)
-            panel.set_title(
-                f"{title}, {'both know the goal' if known else 'only the human knows the goal'}", fontsize=9
-            )
-            panel.grid(alpha=0.3, axis="y")
-    handles, names = grid[0][0].get_legend_handles_labels()
-    drawing.legend(handles, names, fontsize=8, ncols=len(names), loc="outside lower center", frameon=False)
-    return drawing
+                heights[label], intervals[label] = value, np.stack([value - low, high - value])
+            draw_bars(panel, heights, dict.fromkeys(labels, [""] * len(partners)), partners, intervals)
+            panel.set_title(f"{title}, {'both know the goal' if known else 'only the human knows the goal'}")
+    return finish(drawing, list(grid.flat), "", grid[0][0])
