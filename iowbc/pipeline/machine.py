@@ -3,7 +3,7 @@
 import functools
 import importlib.metadata
 import platform
-from dataclasses import dataclass
+from collections.abc import Mapping
 from socket import gethostname
 
 from iowbc.files import file_digest
@@ -11,8 +11,8 @@ from iowbc.pipeline.store.digests import PACKAGE, content_digest
 
 RECORDED_PACKAGES = ("crocoddyl", "mujoco", "numpy", "onnxruntime", "pin", "stable-baselines3", "torch")
 """Versions of these are kept with every artifact."""
-SHOWN = 12
-"""Characters of a digest that are shown."""
+CODE_DIGITS = 12
+"""Hexadecimal digits of the digest by which machines compare their code."""
 
 
 @functools.cache
@@ -27,34 +27,19 @@ def versions() -> dict[str, str]:
     return found
 
 
-@dataclass(frozen=True)
-class Identity:
-    """The properties of a machine that results depend on."""
-
-    host: str
-    versions: dict[str, str]
-    """Versions of Python and of the packages that affect results."""
-    code: str
-    """Digest of the package's modules."""
-
-    def mismatch(self, other: "Identity") -> str:
-        """Differences of another machine from this one, with both values; empty where results would be the same."""
-        names = sorted(self.versions.keys() | other.versions.keys())
-        found = [
-            f"{name} {self.versions.get(name, 'missing')} here, {other.versions.get(name, 'missing')} on {other.host}"
-            for name in names
-            if self.versions.get(name) != other.versions.get(name)
-        ]
-        if self.code != other.code:
-            found.append(f"code {self.code[:SHOWN]} here, {other.code[:SHOWN]} on {other.host}")
-        return "; ".join(found)
-
-
-def identity() -> Identity:
-    return Identity(gethostname(), versions(), _code())
-
-
 @functools.cache
-def _code() -> str:
+def identity() -> Mapping[str, str]:
+    """The properties of this machine that results depend on, and its name as `host`: `versions()`, and the digest of
+    the package's modules as `code`."""
     sources = sorted(PACKAGE.rglob("*.py"))
-    return content_digest({path.relative_to(PACKAGE).as_posix(): file_digest(path) for path in sources})
+    code = content_digest({path.relative_to(PACKAGE).as_posix(): file_digest(path) for path in sources})
+    return {"host": gethostname(), **versions(), "code": code[:CODE_DIGITS]}
+
+
+def mismatch(own: Mapping[str, str], other: Mapping[str, str]) -> str:
+    """Differences of another machine from this one, with both values; empty where results would be the same."""
+    return "; ".join(
+        f"{name} {own.get(name, 'missing')} here, {other.get(name, 'missing')} on {other['host']}"
+        for name in sorted((own.keys() | other.keys()) - {"host"})
+        if own.get(name) != other.get(name)
+    )
