@@ -166,14 +166,11 @@ def _film(job: Job, training: "TeacherTraining", films: "TrainingFilms") -> None
 
 
 def _note(values: Mapping[str, float]) -> str:
-    parts = (
-        f"{values['episode_seconds']:.1f} s an episode",
-        f"{100 * values['terminations/fallen']:.0f} % fall",
-        f"level {values['curriculum_level']:.2f}",
-        f"KL {values.get('train/kl', float('nan')):.3f}",
-        f"{values['steps_per_second']:,.0f} steps/s",
+    return (
+        f"{values['episode_seconds']:.1f} s an episode, {100 * values['terminations/fallen']:.0f} % fall, "
+        f"level {values['curriculum_level']:.2f}, KL {values.get('train/kl', float('nan')):.3f}, "
+        f"{values['steps_per_second']:,.0f} steps/s"
     )
-    return ", ".join(parts)
 
 
 STAGE = Stage(
