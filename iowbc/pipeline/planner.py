@@ -1,6 +1,7 @@
 """The plan of a recipe: stages that would run, and why."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -125,10 +126,8 @@ class Planner:
             text = f"code changed since it was made: {', '.join(changed)}"
             if whole and not artifact.whole:
                 reasons.append(NOT_WHOLE)
-            elif changed and self.options.on_code_change == "rerun":
-                reasons.append(text)
-            if changed and self.options.on_code_change == "report":
-                notes.append(text)
+            if changed:
+                (reasons if self.options.on_code_change == "rerun" else notes).append(text)
             notes.extend(self._cosmetic_notes(stage, artifact))
         return replace(step, artifact=artifact, damage=damage, reasons=tuple(reasons), notes=tuple(notes))
 
@@ -161,11 +160,9 @@ class Planner:
             if alike and there and [path for path, _, _ in changes] == [stage.extends] and changes[0][1] < aim:
                 ends[changes[0][1]] = artifact
         for end in sorted(ends, reverse=True):
-            try:
+            with suppress(Damaged):
                 ends[end].verify()
-            except Damaged:
-                continue
-            return ends[end]
+                return ends[end]
         return None
 
     def _cosmetic_notes(self, stage: Stage, artifact: Artifact) -> Iterator[str]:

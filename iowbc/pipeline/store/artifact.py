@@ -91,10 +91,7 @@ class Artifact:
     def ingredients(self) -> dict[str, Any]:
         """Ingredients of its key; empty where they are not readable or do not give the key."""
         found = read_json(self.folder / INGREDIENTS)
-        try:
-            return found if data_digest(found) == self.manifest.key else {}
-        except ValueError:
-            return {}
+        return found if _has_digest(found, self.manifest.key) else {}
 
     @property
     def recipe(self) -> dict[str, Any]:
@@ -188,7 +185,7 @@ def read_artifact(folder: Path, stage: str, key: str, *, published: bool = False
     if not (folder / MANIFEST).is_file():
         raise Damaged(f"{MANIFEST} is missing")
     found = read_json(folder / MANIFEST)
-    whole = _sealed(found)
+    whole = _has_digest({name: entry for name, entry in found.items() if name != "seal"}, found.get("seal"))
     try:
         manifest = Manifest.model_validate(found)
     except ValidationError:
@@ -201,11 +198,11 @@ def read_artifact(folder: Path, stage: str, key: str, *, published: bool = False
     return Artifact(folder, manifest, published)
 
 
-def _sealed(found: Mapping[str, Any]) -> bool:
-    """True for a manifest as it was written, also by a newer version with more entries."""
+def _has_digest(data: Mapping[str, Any], digest: str | None) -> bool:
+    """True for data as they were written, also by a newer version with more entries; False for damaged ones."""
     try:
-        return bool(data_digest({name: entry for name, entry in found.items() if name != "seal"}) == found.get("seal"))
-    except ValueError:
+        return data_digest(data) == digest
+    except ValueError:  # a damaged number may be NaN
         return False
 
 
