@@ -250,7 +250,7 @@ def trainings_table(groups: Sequence[Group], missing: Sequence[str] = ()) -> Tab
 
     used = {stage for group in groups for run in group.runs for stage in run.recipe.get("stages", ())}
     named = [STAGES[name] for name in STAGES if name in used | {"teacher", "distill"}]
-    methods = {stage.name: stage.presentation.trained_by for stage in named if stage.presentation.trained_by}
+    methods = {stage.name: stage.trained_by for stage in named if stage.trained_by}
     rows: list[tuple[str, ...]] = []
     numbers: list[dict[str, object]] = []
     for group in groups:

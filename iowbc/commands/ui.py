@@ -52,7 +52,7 @@ def ui(
 
 def view() -> dict[str, object]:
     """MLflow's view of the runs: newest first, stages within their run, with the columns that tell most."""
-    metrics = [f"metrics.`{stage.name}/{name}`" for stage in STAGES.values() for name in stage.presentation.columns]
+    metrics = [f"metrics.`{stage.name}/{name}`" for stage in STAGES.values() for name in stage.columns]
     return {
         "searchFilter": "",
         "orderByKey": "attributes.start_time",

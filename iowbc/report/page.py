@@ -42,7 +42,7 @@ def write_page(
     )
     curves: dict[str, CurvePanel] = {}
     learning = []
-    for stage in (name for name, one in STAGES.items() if one.presentation.trained_by):
+    for stage in (name for name, one in STAGES.items() if one.trained_by):
         main, others = learning_panels(groups, stage)
         learning.append((stage, _numbered(curves, main), _numbered(curves, others)))
     evaluation = _numbered(curves, evaluation_panels(groups))
@@ -59,7 +59,7 @@ def write_page(
         evaluation=evaluation,
         films=_media(runs, "videos", together, ".mp4"),
         pictures=_media(runs, "figures", together, ".png"),
-        first_pictures=[name for stage in STAGES.values() for name in stage.presentation.pictures],
+        first_pictures=[name for stage in STAGES.values() for name in stage.pictures],
         differences=differences,
         provenance=[(run, stage, made, _beside(made)) for run in runs for stage, made in run.artifacts.items()],
         key_shown=KEY_LENGTH,

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from iowbc.errors import Interrupted, StageFailed
-from iowbc.pipeline.stage import Job, Presentation, Stage
+from iowbc.pipeline.stage import Job, Stage
 from iowbc.recipe.export import Export
 from iowbc.stages.inputs import generator_stage, policy_stage, without_student
 
@@ -131,7 +131,7 @@ STAGE = Stage(
     run=run,
     problems=lambda recipe: without_student(recipe, "export"),
     results=("step.onnx", "settle.onnx", "contract.json", "golden.npz"),
-    presentation=Presentation(
-        headline=("parity", "step_ms", "acceptance_survived"), columns=("parity",), leaves_policy=True
-    ),
+    headline=("parity", "step_ms", "acceptance_survived"),
+    columns=("parity",),
+    leaves_policy=True,
 )

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from iowbc.errors import StageFailed
-from iowbc.pipeline.stage import Job, Presentation, Stage
+from iowbc.pipeline.stage import Job, Stage
 
 if TYPE_CHECKING:
     from iowbc.pipeline.cluster.spread import NodeSpread
@@ -194,6 +194,7 @@ STAGE = Stage(
     run=run,
     results=("dataset.npz", LABELLED),
     counts=("rg.sampling.samples",),
-    presentation=Presentation(headline=("samples", "kept", "crosscheck_p90"), pictures=("postures.png",)),
+    headline=("samples", "kept", "crosscheck_p90"),
+    pictures=("postures.png",),
     spreads=lambda recipe: True,
 )

@@ -5,7 +5,7 @@ from contextlib import closing
 
 from iowbc.errors import StageFailed
 from iowbc.learning.curves import TABLE
-from iowbc.pipeline.stage import Job, Presentation, Stage
+from iowbc.pipeline.stage import Job, Stage
 from iowbc.recipe.recipe import Recipe
 from iowbc.stages.inputs import generator_stage, policy_stage, without_student
 from iowbc.stages.training import STATE, leave_extendable, train
@@ -106,10 +106,8 @@ STAGE = Stage(
     extends="skill.learning.steps",
     extends_from=(STATE, TABLE),
     counts=("skill.learning.steps",),
-    presentation=Presentation(
-        headline=("*/success", "*/partner_force_p90"),
-        columns=("scripted/success", "scripted/partner_force_p90"),
-        curves=("scripted/success", "scripted/partner_force_p90", "scripted/reward", "learnt/success"),
-        trained_by="MAPPO",
-    ),
+    headline=("*/success", "*/partner_force_p90"),
+    columns=("scripted/success", "scripted/partner_force_p90"),
+    curves=("scripted/success", "scripted/partner_force_p90", "scripted/reward", "learnt/success"),
+    trained_by="MAPPO",
 )

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
-from iowbc.pipeline.stage import ExternalInput, Job, Presentation, Stage
+from iowbc.pipeline.stage import ExternalInput, Job, Stage
 from iowbc.recipe.recipe import Recipe
 from iowbc.results.frame import write_frame
 from iowbc.stages.inputs import generator_stage, policy_stage, without_student
@@ -127,9 +127,7 @@ STAGE = Stage(
     problems=problems,
     results=("games.parquet",),
     borrows=borrows,
-    presentation=Presentation(
-        headline=("games", "*/human_only/partner_force_p90", "*/human_only/success"),
-        columns=("games",),
-        pictures=("skill_partners.png",),
-    ),
+    headline=("games", "*/human_only/partner_force_p90", "*/human_only/success"),
+    columns=("games",),
+    pictures=("skill_partners.png",),
 )
