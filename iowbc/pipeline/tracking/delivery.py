@@ -114,13 +114,19 @@ class Delivery:
 
     def _deliver(self, found: Sequence[dict[str, Any]]) -> None:
         """Send one event, or several with metrics of one run; MLflow's refusal is noted, and they are left out."""
+        from mlflow.entities import Metric
         from mlflow.exceptions import MlflowException
 
         event, kind = found[0], found[0]["event"]
         try:
             run = self._run_of(event)
             if kind == "metrics":
-                self._metrics(run, found)
+                metrics = [
+                    Metric(name, value, one["time"], one["step"])
+                    for one in found
+                    for name, value in one["values"].items()
+                ]
+                self._client.log_batch(run, metrics=metrics)
             elif kind in ("reopen", "tags"):
                 if kind == "reopen":
                     self._client.update_run(run, status="RUNNING")
@@ -168,16 +174,6 @@ class Delivery:
             params=[Param(name, text[:MAXIMUM_TEXT]) for name, text in params.items()],
             tags=[RunTag(name, text[:MAXIMUM_TEXT]) for name, text in tags.items()],
         )
-
-    def _metrics(self, run: str, found: Sequence[Mapping[str, Any]]) -> None:
-        from mlflow.entities import Metric
-
-        metrics = [
-            Metric(name, value, event["time"], event["step"])
-            for event in found
-            for name, value in event["values"].items()
-        ]
-        self._client.log_batch(run, metrics=metrics)
 
     def _files(self, run: str, names: Sequence[str]) -> None:
         """Send files and folders below `runs`; for the embedded database copy them to MLflow's artifact folder."""
