@@ -33,19 +33,6 @@ class Report(Protocol):
         """Let tracking have a file or folder of the stage while it runs; it may be reported again."""
 
 
-class Member(Protocol):
-    """An object that works for a stage on another machine, and can be remade there or elsewhere."""
-
-    def ask(self, message: Any) -> Any:
-        """Carry out a request; returns the answer."""
-
-    def state(self) -> Any:
-        """Complete state of the object."""
-
-    def restore(self, state: Any) -> None:
-        """Inverse of `state`."""
-
-
 @dataclass(frozen=True)
 class Job:
     """One execution of a stage."""
