@@ -18,7 +18,7 @@ from iowbc.evaluation.trials.plan import UNDISTURBED, command_script, planned_ep
 from iowbc.evaluation.trials.rollout import play_episodes
 from iowbc.learning.acting import Policy, StudentPolicy
 from iowbc.recipe.recipe import Recipe
-from iowbc.rollouts.history import History
+from iowbc.rollouts.policies import History
 from iowbc.task.episodes import Episode
 from iowbc.task.specification import Specification
 

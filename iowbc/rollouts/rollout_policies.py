@@ -9,8 +9,7 @@ import numpy as np
 
 from iowbc.arrays import Array, Indices, Mask
 from iowbc.rollouts.blocks import in_blocks
-from iowbc.rollouts.history import History
-from iowbc.rollouts.policies import HistoryPolicy, RowPolicy
+from iowbc.rollouts.policies import History, HistoryPolicy, RowPolicy
 
 Decision = tuple[Array, Mapping[str, Array]]
 """The action, (n, A), and further records by name, (n, ...)."""
