@@ -10,10 +10,9 @@ from socket import gethostname
 
 from iowbc.errors import Damaged, Interrupted, IowbcError, PipelineFailed
 from iowbc.full_disk import is_disk_full, what_is_full
-from iowbc.pipeline.code import changed_code
+from iowbc.pipeline.code import changed_code, versions
 from iowbc.pipeline.console.display import Display, StageView
 from iowbc.pipeline.console.wording import short
-from iowbc.pipeline.machine import versions
 from iowbc.pipeline.planner import Planner
 from iowbc.pipeline.stage import Job, Stage
 from iowbc.pipeline.stage_plan import StagePlan

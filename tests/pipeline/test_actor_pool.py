@@ -15,7 +15,7 @@ from ray import exceptions
 from iowbc.errors import Damaged, Interrupted, StageFailed, WorkerFailed
 from iowbc.pipeline.cluster.folders import SharedFolder
 from iowbc.pipeline.cluster.spread import TRIES, ActorHost, NodeActorPool
-from iowbc.pipeline.machine import identity
+from iowbc.pipeline.code import identity
 
 pytestmark = pytest.mark.unit
 

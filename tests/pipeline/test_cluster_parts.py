@@ -15,7 +15,7 @@ from iowbc.errors import Damaged, StageFailed
 from iowbc.pipeline.cluster import folders, stage_task
 from iowbc.pipeline.cluster.folders import SharedFolder, files_of, placed, write_files
 from iowbc.pipeline.cluster.stage_task import NodeReport
-from iowbc.pipeline.machine import identity, mismatch
+from iowbc.pipeline.code import identity, mismatch
 from iowbc.pipeline.store.digests import folder_digest
 
 

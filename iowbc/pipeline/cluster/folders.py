@@ -12,7 +12,7 @@ import ray
 
 from iowbc.errors import Damaged, StageFailed
 from iowbc.files import replacing
-from iowbc.pipeline.machine import identity, mismatch
+from iowbc.pipeline.code import identity, mismatch
 from iowbc.pipeline.store.digests import folder_digest, folder_files
 from iowbc.pipeline.store.locks import named_lock
 
