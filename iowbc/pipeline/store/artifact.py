@@ -68,10 +68,6 @@ class Manifest(BaseModel):
     seal: str = ""
     """Digest of all of the above."""
 
-    def sealed(self) -> "Manifest":
-        """The manifest with its seal."""
-        return self.model_copy(update={"seal": data_digest(self.model_dump(mode="json", exclude={"seal"}))})
-
 
 @dataclass(frozen=True)
 class Artifact:
@@ -177,7 +173,8 @@ def seal(
 
 def write_manifest(folder: Path, manifest: Manifest) -> None:
     """Seal and write a manifest; call it after all other files are written."""
-    write_whole(folder / MANIFEST, manifest.sealed().model_dump_json(indent=1))
+    seal = data_digest(manifest.model_dump(mode="json", exclude={"seal"}))
+    write_whole(folder / MANIFEST, manifest.model_copy(update={"seal": seal}).model_dump_json(indent=1))
 
 
 def read_artifact(folder: Path, stage: str, key: str, *, published: bool = False) -> Artifact:
