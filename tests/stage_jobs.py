@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from iowbc.pipeline.stage import Job, Member
+from iowbc.pipeline.stage import Job
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import robot_folder
 
@@ -51,7 +51,7 @@ class Backwards:
             yield place, function(*calls[place], **folders)
 
     def actor_pool(
-        self, called: str, make: Callable[..., Member], calls: Sequence[tuple[Any, ...]], folders: Mapping[str, Path]
+        self, called: str, make: Callable[..., Any], calls: Sequence[tuple[Any, ...]], folders: Mapping[str, Path]
     ) -> "Remade":
         self.pools.append(len(calls))
         return Remade([partial(make, *own, **folders) for own in calls])
@@ -60,7 +60,7 @@ class Backwards:
 class Remade:
     """Stands for members on other machines that are lost all the time: before each request every one is made anew."""
 
-    def __init__(self, made: Sequence[Callable[[], Member]]) -> None:
+    def __init__(self, made: Sequence[Callable[[], Any]]) -> None:
         self.made = made
         self.states: list[Any] = [None for _ in made]
         self.found: list[Any] = []

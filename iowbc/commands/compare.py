@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
+from rich.filesize import decimal
 
 from iowbc.commands import completion, options
 from iowbc.commands.diff import difference_lines
@@ -16,7 +17,6 @@ from iowbc.commands.printed import film_progress, print_json, shown_path, stdout
 from iowbc.commands.results import PROBE, TRIALS, evaluated_actor, split_tables, tables_of
 from iowbc.errors import UsageError
 from iowbc.pipeline.console.live_table import sparkline
-from iowbc.pipeline.console.wording import size
 from iowbc.pipeline.nested import flattened
 from iowbc.pipeline.store.last_used import require_whole
 from iowbc.pipeline.store.runs import Runs, require_writable
@@ -134,7 +134,7 @@ def report(
     tables, media = _joined(store, found)
     main, others = split_tables(tables)
     write_page(output, found, grouped(found), main, others, differences, media)
-    tell(console, f"{shown_path(output)} ({size(output.stat().st_size)}): open it in any browser, no network needed")
+    tell(console, f"{shown_path(output)} ({decimal(output.stat().st_size)}): open it in any browser, no network needed")
 
 
 def _joined(store: Store, found: Sequence[Run]) -> tuple[list[Table], dict[str, bytes]]:
@@ -251,7 +251,7 @@ def trainings_table(groups: Sequence[Group], missing: Sequence[str] = ()) -> Tab
 
     used = {stage for group in groups for run in group.runs for stage in run.recipe.get("stages", ())}
     named = [STAGES[name] for name in STAGES if name in used | {"teacher", "distill"}]
-    methods = {stage.name: stage.presentation.trained_by for stage in named if stage.presentation.trained_by}
+    methods = {stage.name: stage.trained_by for stage in named if stage.trained_by}
     numbers = [
         {"recipe": run.label, "algorithm": str(run.recipe["eval"]["label"]), "seed": seed}
         | {stage: _steps_of(run, stage) for stage in methods}

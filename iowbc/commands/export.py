@@ -6,13 +6,13 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.filesize import decimal
 
 from iowbc.commands import completion, options
 from iowbc.commands.play import playable
 from iowbc.commands.printed import shown_path, stdout_console, tell
 from iowbc.deploy.exported_folder import CONTRACT
 from iowbc.errors import UsageError
-from iowbc.pipeline.console.wording import size
 from iowbc.pipeline.store.runs import Runs, require_writable
 from iowbc.pipeline.store.store import Store
 
@@ -43,5 +43,5 @@ def export(
     say = partial(tell, stdout_console())
     write_page(exported, folder, store.runs.npm, say)
     whole = sum(path.stat().st_size for path in folder.iterdir())
-    say(f"{shown_path(folder)} ({size(whole)}): copy it to any web server; to look at it here:")
+    say(f"{shown_path(folder)} ({decimal(whole)}): copy it to any web server; to look at it here:")
     say(f"python3 -m http.server --bind 127.0.0.1 --directory {shown_path(folder)} 8000")

@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.filesize import decimal
 
 from iowbc.commands import options
 from iowbc.commands.lookup import known_recipes, last_used
 from iowbc.commands.printed import shown_path, stdout_console, tell
 from iowbc.errors import UsageError, require_known
 from iowbc.files import OLD
-from iowbc.pipeline.console.wording import size
 from iowbc.pipeline.store.last_used import ever_used, record_path, remove_dangling
 from iowbc.pipeline.store.locks import holder
 from iowbc.pipeline.store.publishing import PUBLISHING
@@ -69,10 +69,10 @@ def gc(
             shutil.rmtree(doomed)
         elif not dry_run:
             path.unlink()
-        tell(console, f"{verb} {shown_path(path)} ({size(count)})")
+        tell(console, f"{verb} {shown_path(path)} ({decimal(count)})")
     if not dry_run:
         remove_dangling(store.runs)
-    console.print(f"{size(total)} in all", highlight=False)
+    console.print(f"{decimal(total)} in all", highlight=False)
 
 
 def _to_remove(

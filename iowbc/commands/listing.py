@@ -7,6 +7,7 @@ from typing import Annotated, Any
 import typer
 from rich.columns import Columns
 from rich.console import Console
+from rich.filesize import decimal
 from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
@@ -16,7 +17,7 @@ from iowbc.commands.lookup import known_recipes, last_used, named
 from iowbc.commands.printed import artifact_data, plain_table, print_json, shown_path, stdout_console, tell
 from iowbc.errors import require_known, shown
 from iowbc.pipeline.console.live_table import sparkline
-from iowbc.pipeline.console.wording import KEY_LENGTH, ago, duration, figure, size
+from iowbc.pipeline.console.wording import KEY_LENGTH, ago, duration, figure
 from iowbc.pipeline.nested import flattened
 from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.last_used import ever_used, named_folder, recall
@@ -115,7 +116,7 @@ def ls(
             ", ".join(users.get(manifest.key, [f"{manifest.recipe} (published)" if artifact.published else "-"])),
             ago(manifest.made),
             duration(manifest.seconds),
-            size(artifact.size),
+            decimal(artifact.size),
         )
     if artifacts:
         console.print(table)
@@ -158,7 +159,7 @@ def _show_artifact(store: Store, artifact: Artifact, console: Console) -> None:
         "took": f"{duration(manifest.seconds)} in {manifest.attempts} attempt(s) with {manifest.workers} worker(s)",
         "reads": "\n".join(f"{name} (content {digest[:KEY_LENGTH]})" for name, digest in inputs.items()),
         "metrics": "\n".join(f"{name} {figure(value, 6)}" for name, value in artifact.metrics.items()),
-        "files": "\n".join(f"{name} ({size(record.size)})" for name, record in manifest.files.items()),
+        "files": "\n".join(f"{name} ({decimal(record.size)})" for name, record in manifest.files.items()),
         "versions": ", ".join(f"{name} {version}" for name, version in manifest.versions.items()),
         "recipe": "\n".join(_unusual(ingredients.get("recipe", {}))),
     }

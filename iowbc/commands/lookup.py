@@ -194,7 +194,7 @@ def in_training(store: Store, word: str, stage: str | None) -> UnfinishedTrainin
     """The newest unfinished training that `RECIPE/STAGE`, or a recipe and `--stage`, names, if there is one."""
     name, slash, last = word.rpartition("/")
     name, wanted = (name, last) if slash else (word, stage)
-    if wanted not in STAGES or not STAGES[wanted].presentation.trained_by:
+    if wanted not in STAGES or not STAGES[wanted].trained_by:
         return None
     own = [one for one in unfinished(store.runs) if (one[1].stage, one[1].recipe) == (wanted, Path(name).stem)]
     if not own:
@@ -238,14 +238,14 @@ def input_artifact(store: Store, ingredients: Mapping[str, Any], stage: str, wha
 def policy_of(store: Store, evaluation: Artifact) -> Artifact:
     """The policy that an evaluation played. Raises `UsageError`."""
     for name, stage in reversed(STAGES.items()):
-        if stage.presentation.trained_by and (policy := input_of(store, evaluation, name)) is not None:
+        if stage.trained_by and (policy := input_of(store, evaluation, name)) is not None:
             return policy
     raise UsageError(f"{evaluation.folder}: this evaluation read no policy; run its recipe again")
 
 
 def policy_stages() -> list[str]:
     """Stages that leave a policy, the one to prefer first."""
-    return [name for name, stage in reversed(STAGES.items()) if stage.presentation.leaves_policy]
+    return [name for name, stage in reversed(STAGES.items()) if stage.leaves_policy]
 
 
 def world_of(resolved: Mapping[str, Any], generator: Artifact | None) -> "Specification":

@@ -180,7 +180,7 @@ def _print(steps: Sequence[StagePlan], console: Console) -> None:
 
 def _described(step: StagePlan) -> Text:
     if step.cached:
-        key = f"  {(step.key or '')[:KEY_LENGTH]}"
+        key = f"  {step.key[:KEY_LENGTH]}"
         return Text.assemble(("cached (published)" if step.published else "cached", "cyan"), (key, "dim"))
     takes = "" if step.guess is None else f", {time_of([step])}"
     if step.expected is None and step.roughly is not None:
@@ -194,7 +194,7 @@ def step_data(step: StagePlan) -> dict[str, Any]:
         "stage": step.stage.name,
         "cached": step.cached,
         "published": step.published,
-        "key": step.key,
+        "key": step.key or None,
         "reasons": step.reasons,
         "notes": step.notes,
         "expected_seconds": None if step.cached else step.expected,

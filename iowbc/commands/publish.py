@@ -3,12 +3,12 @@
 from typing import Annotated
 
 import typer
+from rich.filesize import decimal
 
 from iowbc.commands import options
 from iowbc.commands.printed import shown_path, stdout_console, tell
 from iowbc.commands.request import Request, planners
 from iowbc.errors import UsageError
-from iowbc.pipeline.console.wording import size
 from iowbc.pipeline.stage_plan import Options
 from iowbc.pipeline.store.publishing import publish as copied
 from iowbc.pipeline.store.publishing import published_size
@@ -54,7 +54,7 @@ def publish(
         copy = artifact if artifact.published and not to_leave_out else copied(request.runs, artifact, without)
         left_out = ", ".join(copy.manifest.omitted)
         lacks = [f"without {left_out}"] if left_out else []
-        what = f"{artifact.manifest.stage}: {shown_path(copy.folder)} ({size(copy.size)})"
+        what = f"{artifact.manifest.stage}: {shown_path(copy.folder)} ({decimal(copy.size)})"
         text = "; ".join([what, *lacks, *notes.get(key, ())])
         tell(console, text)
-    console.print(f"{size(published_size(request.runs))} are published in all", highlight=False)
+    console.print(f"{decimal(published_size(request.runs))} are published in all", highlight=False)

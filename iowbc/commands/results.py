@@ -67,7 +67,7 @@ def print_results(runs: Runs, recipe: str, artifacts: Mapping[str, Artifact], co
 
 def headline(stage: str, metrics: Mapping[str, float]) -> list[tuple[str, float]]:
     """The few metrics that tell most of a stage: by its patterns, else the first ones."""
-    patterns = STAGES[stage].presentation.headline if stage in STAGES else ()
+    patterns = STAGES[stage].headline if stage in STAGES else ()
     chosen = [name for pattern in patterns for name in metrics if fnmatchcase(name, pattern)]
     return [(name, metrics[name]) for name in (chosen or list(metrics))[:METRICS_SHOWN]]
 

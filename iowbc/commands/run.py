@@ -120,6 +120,7 @@ def requested_cluster(asked: Options, execution: Execution) -> "AbstractContextM
     """Context manager of the requested cluster; it yields None if stages run here. Raises `UsageError`."""
     if (asked.engine or execution.engine) == "local":
         return nullcontext()
+    options.require_extra("cluster", "--engine ray")
     from iowbc.pipeline.cluster.connection import connected
 
     return connected(asked.address or execution.address, copy=execution.copy_files)

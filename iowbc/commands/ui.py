@@ -12,7 +12,7 @@ import typer
 from iowbc.commands import options
 from iowbc.commands.printed import stdout_console, tell
 from iowbc.pipeline.store.runs import Runs, require_writable_runs
-from iowbc.pipeline.tracking.delivery import client, embedded_uri, experiment, setup_lock
+from iowbc.pipeline.tracking.delivery import embedded_uri, open_experiment
 from iowbc.pipeline.tracking.tracker import backlog, start_sender
 from iowbc.recipe.execution import Execution
 from iowbc.stages.registry import STAGES
@@ -32,11 +32,8 @@ def ui(
     options.require_free(port)
     signal.signal(signal.SIGTERM, signal.getsignal(signal.SIGINT))
     uri = embedded_uri(runs)
-    with setup_lock(runs):
-        mlflow = client(uri)
-        mlflow.search_experiments(max_results=1)
-        shown = experiment(mlflow, Execution.model_fields["experiment"].default, runs)
-        mlflow.set_experiment_tag(shown, f"mlflow.sharedViewState.{VIEW}", json.dumps(view()))
+    mlflow, shown = open_experiment(runs, uri, Execution.model_fields["experiment"].default)
+    mlflow.set_experiment_tag(shown, f"mlflow.sharedViewState.{VIEW}", json.dumps(view()))
     if backlog(runs):
         start_sender(runs)
     page = f"http://{options.HOST}:{port}/#/experiments/{shown}/runs"
@@ -55,7 +52,7 @@ def ui(
 
 def view() -> dict[str, object]:
     """MLflow's view of the runs: newest first, stages within their run, with the columns that tell most."""
-    metrics = [f"metrics.`{stage.name}/{name}`" for stage in STAGES.values() for name in stage.presentation.columns]
+    metrics = [f"metrics.`{stage.name}/{name}`" for stage in STAGES.values() for name in stage.columns]
     return {
         "searchFilter": "",
         "orderByKey": "attributes.start_time",

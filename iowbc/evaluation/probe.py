@@ -17,7 +17,7 @@ from iowbc.errors import StageFailed
 from iowbc.evaluation.trials.plan import command_script, held_fixed, planned_episode
 from iowbc.evaluation.trials.rollout import play_episodes
 from iowbc.learning.acting import Policy, StudentPolicy
-from iowbc.rollouts.history import History
+from iowbc.rollouts.policies import History
 from iowbc.task.specification import Specification
 
 Features = NDArray[np.float32]

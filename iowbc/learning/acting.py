@@ -16,7 +16,7 @@ from iowbc.learning.networks import Mirrors, StudentNetwork, TeacherNetwork
 from iowbc.learning.storage import Network, load_network
 from iowbc.learning.trained import trained_network
 from iowbc.recipe.teacher import Teacher
-from iowbc.rollouts.history import History
+from iowbc.rollouts.policies import History
 
 
 class Policy(Protocol):

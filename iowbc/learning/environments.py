@@ -9,7 +9,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnvWrapper
 
-from iowbc.rollouts.history import History
+from iowbc.rollouts.policies import History
 from iowbc.rollouts.rollout_policies import ExploringPolicy, Past, RolloutPolicy
 from iowbc.rollouts.trajectories import Trajectories
 

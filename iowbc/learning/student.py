@@ -18,7 +18,7 @@ from iowbc.learning.networks import StudentNetwork, TeacherNetwork, mirror_as_js
 from iowbc.recipe.distillation import Distillation
 from iowbc.robot.mirror import MirrorMap, side_by_side
 from iowbc.rollouts.blocks import block_size
-from iowbc.rollouts.history import History
+from iowbc.rollouts.policies import History
 from iowbc.rollouts.rollout_policies import DaggerPolicy, Past
 
 

@@ -1,10 +1,17 @@
-"""Digests of the code that determines a stage's result: all modules that it imports, transitively."""
+"""What determines a result besides its key: the code, as digests of all modules that a stage imports, and versions.
+
+Machines whose `identity` is the same give the same results.
+"""
 
 import ast
 import functools
+import importlib.metadata
+import platform
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from socket import gethostname
 
+from iowbc.files import file_digest
 from iowbc.pipeline.stage import Stage
 from iowbc.pipeline.store.digests import PACKAGE, content_digest, syntax_digest
 
@@ -13,6 +20,10 @@ INFRASTRUCTURE = ("pipeline", "errors", "files", "full_disk", "processes")
 IN_KEYS = "recipe.recipe"
 """The module of the whole recipe, whose imports are ignored: its values are in keys, and sections count only if a
 stage's code imports them itself."""
+RECORDED_PACKAGES = ("crocoddyl", "mujoco", "numpy", "onnxruntime", "pin", "stable-baselines3", "torch")
+"""Versions of these are kept with every artifact."""
+CODE_DIGITS = 12
+"""Hexadecimal digits of the digest by which machines compare their code."""
 
 
 def stage_code(stage: Stage) -> Mapping[str, str]:
@@ -71,3 +82,33 @@ def _imported(node: ast.AST) -> Iterator[str]:
 def _source(module: str) -> Path:
     path = PACKAGE.joinpath(*module.split("."))
     return path.with_name(f"{path.name}.py")
+
+
+@functools.cache
+def versions() -> dict[str, str]:
+    """Versions of Python and of the packages that shape a result."""
+    found = {"python": platform.python_version()}
+    for name in ("iowbc", *RECORDED_PACKAGES):
+        try:
+            found[name] = importlib.metadata.version(name)
+        except importlib.metadata.PackageNotFoundError:
+            continue
+    return found
+
+
+@functools.cache
+def identity() -> Mapping[str, str]:
+    """The properties of this machine that results depend on, and its name as `host`: `versions()`, and the digest of
+    the package's modules as `code`."""
+    sources = sorted(PACKAGE.rglob("*.py"))
+    code = content_digest({path.relative_to(PACKAGE).as_posix(): file_digest(path) for path in sources})
+    return {"host": gethostname(), **versions(), "code": code[:CODE_DIGITS]}
+
+
+def mismatch(own: Mapping[str, str], other: Mapping[str, str]) -> str:
+    """Differences of another machine from this one, with both values; empty where results would be the same."""
+    return "; ".join(
+        f"{name} {own.get(name, 'missing')} here, {other.get(name, 'missing')} on {other['host']}"
+        for name in sorted((own.keys() | other.keys()) - {"host"})
+        if own.get(name) != other.get(name)
+    )

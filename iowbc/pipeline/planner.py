@@ -1,6 +1,7 @@
 """The plan of a recipe: stages that would run, and why."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -9,8 +10,7 @@ from iowbc.errors import Damaged, Problem, RecipeError, shown
 from iowbc.pipeline.code import changed_code, stage_code
 from iowbc.pipeline.nested import MISSING, differences, nested
 from iowbc.pipeline.stage import ExternalInput, Stage, slice_value
-from iowbc.pipeline.stage_plan import Options, StagePlan
-from iowbc.pipeline.stage_time import estimated
+from iowbc.pipeline.stage_plan import Options, StagePlan, estimated
 from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.digests import data_digest, folder_digest
 from iowbc.pipeline.store.store import Store
@@ -114,9 +114,9 @@ class Planner:
         """The plan with the stored, undamaged artifact of its key, the reasons not to use it, and notes."""
         stage, notes = step.stage, list[str]()
         reasons = ["forced by --force"] if stage.name in self.options.force else []
-        artifact, damage = self.store.checked(stage.name, step.known_key)
+        artifact, damage = self.store.checked(stage.name, step.key)
         if artifact is None:
-            artifact, published_damage = self.store.checked(stage.name, step.known_key, published=True)
+            artifact, published_damage = self.store.checked(stage.name, step.key, published=True)
             if published_damage:
                 notes.append(f"the published artifact is ignored, it is damaged: {published_damage}")
         if artifact is not None:
@@ -126,17 +126,15 @@ class Planner:
             text = f"code changed since it was made: {', '.join(changed)}"
             if whole and not artifact.whole:
                 reasons.append(NOT_WHOLE)
-            elif changed and self.options.on_code_change == "rerun":
-                reasons.append(text)
-            if changed and self.options.on_code_change == "report":
-                notes.append(text)
+            if changed:
+                (reasons if self.options.on_code_change == "rerun" else notes).append(text)
             notes.extend(self._cosmetic_notes(stage, artifact))
         return replace(step, artifact=artifact, damage=damage, reasons=tuple(reasons), notes=tuple(notes))
 
     def _with_resume_point(self, step: StagePlan) -> StagePlan:
         """The plan of a stage that runs, with the earlier attempt or the artifact of a shorter run to resume."""
         stage, notes, expected, predecessor = step.stage, list(step.notes), step.expected, None
-        record, forced = read_progress(self.store.runs.work / step.known_key), stage.name in self.options.force
+        record, forced = read_progress(self.store.runs.work / step.key), stage.name in self.options.force
         if record and (record.forced or not forced):
             notes.append(", ".join(filter(None, [f"goes on from attempt {record.attempts or 1}", record.share])))
             if record.done and record.total and record.seconds:  # the remaining part at the attempt's rate
@@ -162,11 +160,9 @@ class Planner:
             if alike and there and [path for path, _, _ in changes] == [stage.extends] and changes[0][1] < aim:
                 ends[changes[0][1]] = artifact
         for end in sorted(ends, reverse=True):
-            try:
+            with suppress(Damaged):
                 ends[end].verify()
-            except Damaged:
-                continue
-            return ends[end]
+                return ends[end]
         return None
 
     def _cosmetic_notes(self, stage: Stage, artifact: Artifact) -> Iterator[str]:

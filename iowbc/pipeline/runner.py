@@ -10,10 +10,9 @@ from socket import gethostname
 
 from iowbc.errors import Damaged, Interrupted, IowbcError, PipelineFailed
 from iowbc.full_disk import is_disk_full, what_is_full
-from iowbc.pipeline.code import changed_code
+from iowbc.pipeline.code import changed_code, versions
 from iowbc.pipeline.console.display import Display, StageView
 from iowbc.pipeline.console.wording import short
-from iowbc.pipeline.machine import versions
 from iowbc.pipeline.planner import Planner
 from iowbc.pipeline.stage import Job, Stage
 from iowbc.pipeline.stage_plan import StagePlan
@@ -116,7 +115,7 @@ class Runner:
         """
         step = self._decide(stage, whole)
         if step.cached:
-            self._clear(stage, step.known_key)
+            self._clear(stage, step.key)
             return self._reused(step)
         for read in self.planner.stages:
             if read.name in stage.reads(self.loaded.recipe) and not self.artifacts[read.name].whole:
@@ -127,17 +126,17 @@ class Runner:
             self._show(stage, "waits", f"{holder} is making it")
             self.display.say(f"{stage.name}: busy, held by {holder}; waiting for it, to use what it makes")
 
-        with key_lock(self.store.runs, step.known_key, waits, self.interrupted) as held:
+        with key_lock(self.store.runs, step.key, waits, self.interrupted) as held:
             if not held:
                 raise Interrupted
-            workspace = Workspace(self.store.runs, stage.name, step.known_key)
+            workspace = Workspace(self.store.runs, stage.name, step.key)
             self._finish_adding(workspace)
             step = self._decide(stage, whole)
             if step.cached:
                 workspace.remove()
                 return self._reused(step)
             if step.damage:
-                aside = self.store.set_aside(stage.name, step.known_key)
+                aside = self.store.set_aside(stage.name, step.key)
                 self.display.say(f"{stage.name}: its artifact is damaged ({step.damage}); set aside in {aside}")
             return self._made(step, workspace)
 

@@ -33,19 +33,6 @@ class Report(Protocol):
         """Let tracking have a file or folder of the stage while it runs; it may be reported again."""
 
 
-class Member(Protocol):
-    """An object that works for a stage on another machine, and can be remade there or elsewhere."""
-
-    def ask(self, message: Any) -> Any:
-        """Carry out a request; returns the answer."""
-
-    def state(self) -> Any:
-        """Complete state of the object."""
-
-    def restore(self, state: Any) -> None:
-        """Inverse of `state`."""
-
-
 @dataclass(frozen=True)
 class Job:
     """One execution of a stage."""
@@ -90,24 +77,6 @@ class ExternalInput:
 
 
 @dataclass(frozen=True)
-class Presentation:
-    """Presentation of a stage's artifacts in commands and reports."""
-
-    headline: tuple[str, ...] = ()
-    """Patterns of the metrics that are shown at the end of a run, the most telling first; `show` has all."""
-    columns: tuple[str, ...] = ()
-    """Metrics that are columns of MLflow's page."""
-    pictures: tuple[str, ...] = ()
-    """Names of figures that a report shows at once; all others can be unfolded."""
-    curves: tuple[str, ...] = ()
-    """Learning curves that a report always shows; all others can be unfolded."""
-    trained_by: str = ""
-    """Name of the method whose steps the first path of `counts` counts; empty for a stage that does not train."""
-    leaves_policy: bool = False
-    """True where its artifact holds a policy that can be played."""
-
-
-@dataclass(frozen=True)
 class Stage:
     """A step of the pipeline: what makes its key, and the function that does the work."""
 
@@ -135,7 +104,18 @@ class Stage:
     """Artifacts that other recipes make, by their names among the job's inputs, for a given recipe."""
     counts: tuple[str, ...] = ()
     """Dotted recipe paths of numbers that the time it takes is proportional to."""
-    presentation: Presentation = Presentation()
+    headline: tuple[str, ...] = ()
+    """Patterns of the metrics that are shown at the end of a run, the most telling first; `show` has all."""
+    columns: tuple[str, ...] = ()
+    """Metrics that are columns of MLflow's page."""
+    pictures: tuple[str, ...] = ()
+    """Names of figures that a report shows at once; all others can be unfolded."""
+    curves: tuple[str, ...] = ()
+    """Learning curves that a report always shows; all others can be unfolded."""
+    trained_by: str = ""
+    """Name of the method whose steps the first path of `counts` counts; empty for a stage that does not train."""
+    leaves_policy: bool = False
+    """True where its artifact holds a policy that can be played."""
     spreads: Callable[[Recipe], bool] = lambda recipe: False
     """True for a recipe whose heavy work runs on `Job.spread`, if there is one."""
 

@@ -109,7 +109,7 @@ def learning_panels(
         [_columns(run.artifacts[stage].folder) for run in group.runs if stage in run.artifacts] for group in groups
     ]
     names = dict.fromkeys(name for group in found for columns in group for name in columns if name != "step")
-    first = STAGES[stage].presentation.curves
+    first = STAGES[stage].curves
     panels = {name: CurvePanel(title_of(name)) for name in dict.fromkeys([*first, *names]) if name in names}
     for name, panel in panels.items():
         for place, (group, runs) in enumerate(zip(groups, found, strict=True)):

@@ -40,7 +40,7 @@ def write_page(
     template = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True).from_string(
         files("iowbc.report").joinpath("page.html").read_text(encoding="utf-8")
     )
-    trained = [name for name, stage in STAGES.items() if stage.presentation.trained_by]
+    trained = [name for name, stage in STAGES.items() if stage.trained_by]
     learning = [(stage, *learning_panels(groups, stage)) for stage in trained]
     text = template.render(
         title=" · ".join(run.label for run in runs),
@@ -55,7 +55,7 @@ def write_page(
         evaluation=evaluation_panels(groups),
         films=_media(runs, "videos", together, ".mp4"),
         pictures=_media(runs, "figures", together, ".png"),
-        first_pictures=[name for stage in STAGES.values() for name in stage.presentation.pictures],
+        first_pictures=[name for stage in STAGES.values() for name in stage.pictures],
         differences=differences,
         provenance=[(run, stage, made, _beside(made)) for run in runs for stage, made in run.artifacts.items()],
         key_shown=KEY_LENGTH,

@@ -1,9 +1,13 @@
-"""Policies in NumPy: mean actions of stacked rows, as fast as torch, without its memory use in every worker."""
+"""Policies in NumPy and the observation history H_t = {s_{t-k}, ..., s_t} that some receive.
+
+They compute mean actions of stacked rows, as fast as torch, without its memory use in every worker.
+"""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from iowbc.arrays import Array, Indices
 
@@ -115,3 +119,20 @@ class HistoryPolicy:
         latent = self.encoder(seen)
         read = latent if self.estimate is None else self.estimate(latent)
         return self.body(np.concatenate([seen[..., -1, :], read], axis=-1))
+
+
+class History:
+    """The last K observations of n environments, shape (n, K, S), oldest first.
+
+    An episode begins with K copies of its first observation.
+    """
+
+    def __init__(self, environments: int, length: int, observation: int) -> None:
+        self.frames: NDArray[np.float32] = np.zeros((environments, length, observation), np.float32)
+
+    def push(self, observation: NDArray[np.float32], starts: NDArray[np.bool_]) -> NDArray[np.float32]:
+        """Append s_t, shape (n, S), or refill the history with it where `starts`; returns H_t, shape (n, K, S)."""
+        self.frames[:, :-1] = self.frames[:, 1:]
+        self.frames[:, -1] = observation
+        self.frames[starts] = observation[starts, None]
+        return self.frames

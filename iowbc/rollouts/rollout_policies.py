@@ -3,31 +3,16 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Protocol, Self
+from typing import Self
 
 import numpy as np
 
 from iowbc.arrays import Array, Indices, Mask
 from iowbc.rollouts.blocks import in_blocks
-from iowbc.rollouts.history import History
-from iowbc.rollouts.policies import HistoryPolicy, RowPolicy
+from iowbc.rollouts.policies import History, HistoryPolicy, RowPolicy
 
 Decision = tuple[Array, Mapping[str, Array]]
 """The action, (n, A), and further records by name, (n, ...)."""
-
-
-class RolloutPolicy(Protocol):
-    """Policy that acts in n environments during one rollout."""
-
-    @property
-    def starts(self) -> Mask:
-        """Environments whose episode begins with the first row, (n,)."""
-
-    def part(self, first: int, last: int) -> "RolloutPolicy":
-        """The policy for environments `first` to `last`, the latter excluded; `first` starts a block."""
-
-    def act(self, step: int, rows: Array, starts: Mask) -> Decision:
-        """The decision for rows (n, S); `starts`: environments whose episode begins with them, (n,)."""
 
 
 @dataclass(frozen=True)
@@ -63,11 +48,11 @@ class ExploringPolicy:
 
     @property
     def starts(self) -> Mask:
-        """See `RolloutPolicy`."""
+        """Environments whose episode begins with the first row, (n,)."""
         return np.zeros(self.noise.shape[1], np.bool_) if self.past is None else self.past.starts
 
     def part(self, first: int, last: int) -> Self:
-        """See `RolloutPolicy`."""
+        """The policy for environments `first` to `last`, the latter excluded; `first` starts a block."""
         past = None if self.past is None else self.past.of(first, last)
         return replace(self, noise=self.noise[:, first:last], past=past)
 
@@ -76,7 +61,7 @@ class ExploringPolicy:
         return None if self.past is None else self.past.history()
 
     def act(self, step: int, rows: Array, starts: Mask) -> Decision:
-        """See `RolloutPolicy`."""
+        """The decision for rows (n, S); `starts`: environments whose episode begins with them, (n,)."""
         seen = rows
         if self._history is not None:
             seen = self._history.push(rows[:, : self._history.frames.shape[2]], starts)
@@ -105,11 +90,11 @@ class DaggerPolicy:
 
     @property
     def starts(self) -> Mask:
-        """See `RolloutPolicy`."""
+        """See `ExploringPolicy`."""
         return self.past.starts
 
     def part(self, first: int, last: int) -> Self:
-        """See `RolloutPolicy`."""
+        """See `ExploringPolicy`."""
         own = slice(first, last)
         return replace(self, teacher_of=self.teacher_of[own], taught=self.taught[own], past=self.past.of(first, last))
 
@@ -118,7 +103,7 @@ class DaggerPolicy:
         return self.past.history()
 
     def act(self, step: int, rows: Array, starts: Mask) -> Decision:
-        """See `RolloutPolicy`. Records `own`, the student's action, and `answer`, the teacher's, (n, A) each."""
+        """See `ExploringPolicy`. Records `own`, the student's action, and `answer`, the teacher's, (n, A) each."""
         del step
         answer = self._answer(0, rows)
         for place in range(1, len(self.teachers)):
@@ -134,3 +119,7 @@ class DaggerPolicy:
         seen[:, self.masked] = teacher.normal.mean[self.masked]
         seen = np.concatenate([seen[:, self.observation], seen[:, self.privileged]], axis=1)
         return in_blocks(teacher, self.block, seen)
+
+
+RolloutPolicy = ExploringPolicy | DaggerPolicy
+"""Policy that acts in n environments during one rollout."""

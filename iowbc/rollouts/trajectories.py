@@ -57,7 +57,10 @@ def roll(environments: StepBuffers, rollout_policy: RolloutPolicy, steps: int) -
         began = time.perf_counter()
         observations.append(buffers["observation"].copy())
         action, beside = rollout_policy.act(step, observations[-1], starts)
-        _check_finite(action)
+        wrong = np.flatnonzero(~np.isfinite(action).all(axis=1))
+        if len(wrong):
+            which = f"environments {wrong.tolist()} of the {len(action)} here"
+            raise ValueError(f"actions of {which} are not finite, the first is {action[wrong[0]]}")
         buffers["action"][:] = action
         acting += time.perf_counter() - began
         environments.step()
@@ -79,13 +82,6 @@ def roll(environments: StepBuffers, rollout_policy: RolloutPolicy, steps: int) -
         records={name: np.stack([beside[name] for beside in records]) for name in records[0]},
         acting=acting,
     )
-
-
-def _check_finite(action: Array) -> None:
-    wrong = np.flatnonzero(~np.isfinite(action).all(axis=1))
-    if len(wrong):
-        which = f"environments {wrong.tolist()} of the {len(action)} here"
-        raise ValueError(f"actions of {which} are not finite, the first is {action[wrong[0]]}")
 
 
 def side_by_side(parts: Sequence[Trajectories]) -> Trajectories:

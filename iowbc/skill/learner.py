@@ -27,7 +27,7 @@ IMITATION_BATCH = 1024
 
 
 class SkillTraining:
-    """Training of robot and human, one update at a time; see `iowbc.stages.training.Training`.
+    """Training of robot and human, one update at a time; see `iowbc.stages.training`.
 
     Both policies start with zero output: the nominal command, and a cooperative human. The human policy learns from the
     episodes in which it acts; the others have scripted humans.

@@ -9,8 +9,7 @@ import numpy as np
 from iowbc.arrays import Array, Indices, Keys
 from iowbc.control.command import nominal_command
 from iowbc.rollouts.blocks import in_blocks
-from iowbc.rollouts.history import History
-from iowbc.rollouts.policies import HistoryPolicy
+from iowbc.rollouts.policies import History, HistoryPolicy
 from iowbc.task.batch import Batch
 from iowbc.task.episodes import Episode
 from iowbc.task.judge import Judgement

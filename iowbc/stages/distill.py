@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 
-from iowbc.pipeline.stage import ExternalInput, Job, Presentation, Stage
+from iowbc.pipeline.stage import ExternalInput, Job, Stage
 from iowbc.recipe.recipe import Recipe
 from iowbc.stages.inputs import generator_stage, not_privileged
 from iowbc.stages.training import rolls_elsewhere, train
@@ -117,12 +117,10 @@ STAGE = Stage(
     problems=problems,
     results=("student.safetensors", "student.json"),
     counts=("distill.steps",),
-    presentation=Presentation(
-        headline=("kl", "action_agreement", "episode_seconds"),
-        columns=("action_agreement",),
-        curves=("kl", "action_agreement", "episode_seconds"),
-        trained_by="distillation",
-        leaves_policy=True,
-    ),
+    headline=("kl", "action_agreement", "episode_seconds"),
+    columns=("action_agreement",),
+    curves=("kl", "action_agreement", "episode_seconds"),
+    trained_by="distillation",
+    leaves_policy=True,
     spreads=rolls_elsewhere,
 )

@@ -77,7 +77,7 @@ class RemoteWorkers(Workers):
 
 
 class RolloutActor:
-    """A group of environments where it is stepped: a `Member`."""
+    """A group of environments where it is stepped: a member of an actor pool, see `ActorHost`."""
 
     def __init__(self, setup: Setup, first: int, last: int, *, robot: Path, generator: Path | None = None) -> None:
         world = Specification(setup.specification.recipe, robot, generator)

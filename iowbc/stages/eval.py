@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from iowbc.errors import Interrupted
-from iowbc.pipeline.stage import Job, Presentation, Stage
+from iowbc.pipeline.stage import Job, Stage
 from iowbc.recipe.evaluation.sequences import LIFTING, PUSHING
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.section import deciding
@@ -208,10 +208,8 @@ STAGE = Stage(
     defaults=defaults,
     results=("*.parquet",),
     counts=("eval.trials",),
-    presentation=Presentation(
-        headline=("trials", "survived", "succeeded"),
-        columns=("succeeded", "trials"),
-        pictures=("comparison.png", "compliance.png", "push_map.png"),
-    ),
+    headline=("trials", "survived", "succeeded"),
+    columns=("succeeded", "trials"),
+    pictures=("comparison.png", "compliance.png", "push_map.png"),
     spreads=lambda recipe: True,
 )

@@ -1,27 +1,19 @@
 """Stage `export`: the control step as an ONNX graph, its contract and golden vectors, checked and tried out."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from iowbc.errors import Interrupted, StageFailed
-from iowbc.pipeline.stage import Job, Presentation, Stage
+from iowbc.pipeline.stage import Job, Stage
 from iowbc.recipe.export import Export
-from iowbc.recipe.recipe import Recipe
-from iowbc.stages.inputs import generator_stage, leaves_student, policy_stage
+from iowbc.stages.inputs import generator_stage, policy_stage, without_student
 
 if TYPE_CHECKING:
     from iowbc.deploy.controller import Values
     from iowbc.evaluation.acceptance import Accepted
     from iowbc.export.graph import ControllerGraph
     from iowbc.learning.networks import StudentNetwork
-
-
-def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
-    """Problems: a policy that needs privileged observations."""
-    if not leaves_student(recipe):
-        text = "names export, and no stage of the recipe trains a student: a policy that needs privileged observations "
-        yield "stages", f"{text}cannot run on a robot; add `distill` to its stages, or leave `export` out"
 
 
 def run(job: Job) -> None:
@@ -137,9 +129,9 @@ STAGE = Stage(
     slice=("name", "seed", "rg.height", "simulation", "task", "export"),
     reads=lambda recipe: (*generator_stage(recipe), policy_stage(recipe)),
     run=run,
-    problems=problems,
+    problems=lambda recipe: without_student(recipe, "export"),
     results=("step.onnx", "settle.onnx", "contract.json", "golden.npz"),
-    presentation=Presentation(
-        headline=("parity", "step_ms", "acceptance_survived"), columns=("parity",), leaves_policy=True
-    ),
+    headline=("parity", "step_ms", "acceptance_survived"),
+    columns=("parity",),
+    leaves_policy=True,
 )

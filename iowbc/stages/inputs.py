@@ -19,6 +19,12 @@ def leaves_student(recipe: Recipe) -> bool:
     return "distill" in recipe.stages or recipe.teacher.history is not None
 
 
+def without_student(recipe: Recipe, stage: str) -> Iterator[tuple[str, str]]:
+    """The problem of a stage that needs a student where no stage of the recipe trains one."""
+    if not leaves_student(recipe):
+        yield "stages", f"{stage} needs a student, and none of the stages trains one; add `distill`, or leave it out"
+
+
 def not_privileged(recipe: Recipe, path: str, names: Sequence[str]) -> Iterator[tuple[str, str]]:
     """Problems of a stage: names at a dotted recipe path that are not in s_priv."""
     if not names:

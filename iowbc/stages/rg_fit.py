@@ -1,7 +1,7 @@
 """Stage rg-fit: fits the reference generator to the labels and judges it on held-out samples."""
 
 from iowbc.errors import StageFailed
-from iowbc.pipeline.stage import Job, Presentation, Stage
+from iowbc.pipeline.stage import Job, Stage
 from iowbc.stages.rg_dataset import LABELLED
 
 WORST_SHOWN = 5
@@ -76,5 +76,6 @@ STAGE = Stage(
     run=run,
     results=("rg.safetensors", "rg.json", "feasible.npz"),
     counts=("rg.sampling.samples", "rg.fit.epochs"),
-    presentation=Presentation(headline=("joint_rmse", "height_p95", "foot_p95"), columns=("joint_rmse",)),
+    headline=("joint_rmse", "height_p95", "foot_p95"),
+    columns=("joint_rmse",),
 )

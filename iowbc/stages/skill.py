@@ -5,9 +5,9 @@ from contextlib import closing
 
 from iowbc.errors import StageFailed
 from iowbc.learning.curves import TABLE
-from iowbc.pipeline.stage import Job, Presentation, Stage
+from iowbc.pipeline.stage import Job, Stage
 from iowbc.recipe.recipe import Recipe
-from iowbc.stages.inputs import generator_stage, leaves_student, policy_stage
+from iowbc.stages.inputs import generator_stage, policy_stage, without_student
 from iowbc.stages.training import STATE, leave_extendable, train
 
 PANELS = (
@@ -24,9 +24,7 @@ PANELS = (
 
 def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
     """Problems: no trained student, or the learnt human among the scripted training partners."""
-    if not leaves_student(recipe):
-        text = "names skill, and no stage of the recipe trains a student to act below it; add `distill` to its stages"
-        yield "stages", text
+    yield from without_student(recipe, "skill")
     if "agent" in recipe.skill.partners.training:
         text = "agent: the learnt human joins by skill.learning.scripted_steps and learnt_share; leave it out here"
         yield "skill.partners.training", text
@@ -108,10 +106,8 @@ STAGE = Stage(
     extends="skill.learning.steps",
     extends_from=(STATE, TABLE),
     counts=("skill.learning.steps",),
-    presentation=Presentation(
-        headline=("*/success", "*/partner_force_p90"),
-        columns=("scripted/success", "scripted/partner_force_p90"),
-        curves=("scripted/success", "scripted/partner_force_p90", "scripted/reward", "learnt/success"),
-        trained_by="MAPPO",
-    ),
+    headline=("*/success", "*/partner_force_p90"),
+    columns=("scripted/success", "scripted/partner_force_p90"),
+    curves=("scripted/success", "scripted/partner_force_p90", "scripted/reward", "learnt/success"),
+    trained_by="MAPPO",
 )

@@ -3,10 +3,10 @@
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
-from iowbc.pipeline.stage import ExternalInput, Job, Presentation, Stage
+from iowbc.pipeline.stage import ExternalInput, Job, Stage
 from iowbc.recipe.recipe import Recipe
 from iowbc.results.table import write_frame
-from iowbc.stages.inputs import generator_stage, leaves_student, policy_stage
+from iowbc.stages.inputs import generator_stage, policy_stage, without_student
 from iowbc.stages.skill import GAME
 
 if TYPE_CHECKING:
@@ -25,8 +25,7 @@ RIVALS = {
 def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
     """Problems: no trained student or skill, or unknown tasks or scenes."""
     asked = recipe.skill.eval
-    if not leaves_student(recipe):
-        yield "stages", "names skill-eval, and no stage of the recipe trains a student to act below; add `distill`"
+    yield from without_student(recipe, "skill-eval")
     if "skill" not in recipe.stages and "agent" in asked.partners:
         yield "skill.eval.partners", "agent: no stage of the recipe trains a human; add `skill` to its stages"
     if "skill" not in recipe.stages and asked.controllers:
@@ -128,9 +127,7 @@ STAGE = Stage(
     problems=problems,
     results=("games.parquet",),
     borrows=borrows,
-    presentation=Presentation(
-        headline=("games", "*/human_only/partner_force_p90", "*/human_only/success"),
-        columns=("games",),
-        pictures=("skill_partners.png",),
-    ),
+    headline=("games", "*/human_only/partner_force_p90", "*/human_only/success"),
+    columns=("games",),
+    pictures=("skill_partners.png",),
 )

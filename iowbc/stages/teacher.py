@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from iowbc.errors import StageFailed
 from iowbc.learning.curves import TABLE
-from iowbc.pipeline.stage import START, ExternalInput, Job, Presentation, Stage
+from iowbc.pipeline.stage import START, ExternalInput, Job, Stage
 from iowbc.recipe.recipe import Recipe
 from iowbc.stages.inputs import generator_stage, not_privileged
 from iowbc.stages.training import STATE, leave_extendable, rolls_elsewhere, train
@@ -166,14 +166,11 @@ def _film(job: Job, training: "TeacherTraining", films: "TrainingFilms") -> None
 
 
 def _note(values: Mapping[str, float]) -> str:
-    parts = (
-        f"{values['episode_seconds']:.1f} s an episode",
-        f"{100 * values['terminations/fallen']:.0f} % fall",
-        f"level {values['curriculum_level']:.2f}",
-        f"KL {values.get('train/kl', float('nan')):.3f}",
-        f"{values['steps_per_second']:,.0f} steps/s",
+    return (
+        f"{values['episode_seconds']:.1f} s an episode, {100 * values['terminations/fallen']:.0f} % fall, "
+        f"level {values['curriculum_level']:.2f}, KL {values.get('train/kl', float('nan')):.3f}, "
+        f"{values['steps_per_second']:,.0f} steps/s"
     )
-    return ", ".join(parts)
 
 
 STAGE = Stage(
@@ -188,12 +185,10 @@ STAGE = Stage(
     extends_from=(STATE, TABLE),
     borrows=borrows,
     counts=("teacher.steps",),
-    presentation=Presentation(
-        headline=("best_score", "check/survived", "episode_seconds"),
-        columns=("best_score",),
-        curves=("reward", "episode_seconds", "terminations/fallen", "curriculum_level", "check/score", "check/E_v"),
-        trained_by="PPO",
-        leaves_policy=True,
-    ),
+    headline=("best_score", "check/survived", "episode_seconds"),
+    columns=("best_score",),
+    curves=("reward", "episode_seconds", "terminations/fallen", "curriculum_level", "check/score", "check/E_v"),
+    trained_by="PPO",
+    leaves_policy=True,
     spreads=rolls_elsewhere,
 )

@@ -2,38 +2,20 @@
 
 import time
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING
 
 from iowbc.errors import Interrupted
 from iowbc.pipeline.stage import Job
 from iowbc.recipe.recipe import Recipe
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from iowbc.learning.curves import Curves
+    from iowbc.learning.student import StudentTraining
+    from iowbc.learning.teacher import TeacherTraining
+    from iowbc.skill.learner import SkillTraining
 
-
-class Training(Protocol):
+    Training = TeacherTraining | StudentTraining | SkillTraining
     """A training that goes one update at a time."""
-
-    @property
-    def steps(self) -> int:
-        """Environment steps made so far."""
-
-    @property
-    def planned(self) -> int:
-        """Environment steps after which it is done."""
-
-    def update(self) -> dict[str, float]:
-        """One rollout and its gradient steps; returns their figures."""
-
-    def arrays(self) -> "dict[str, NDArray[Any]]":
-        """Complete state for resuming."""
-
-    def restore(self, arrays: "Mapping[str, NDArray[Any]]") -> None:
-        """Inverse of `arrays`."""
-
 
 STATE = "state.safetensors"
 """File of an artifact with the state from which a longer training continues, together with its table of curves."""
@@ -48,7 +30,7 @@ def rolls_elsewhere(recipe: Recipe) -> bool:
 
 def train(
     job: Job,
-    training: Training,
+    training: "Training",
     checkpoint_every: int,
     note: Callable[[Mapping[str, float]], str],
     look: Callable[[], None] | None = None,
@@ -91,7 +73,7 @@ def train(
     return curves
 
 
-def leave_extendable(job: Job, training: Training) -> None:
+def leave_extendable(job: Job, training: "Training") -> None:
     """Write the final state of a training, from which a longer one can continue."""
     import numpy as np
     from safetensors.numpy import save_file

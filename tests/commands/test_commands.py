@@ -153,8 +153,8 @@ def test_gc_removes_what_it_is_told_to_and_nothing_else(folder: Path, command: C
     teachers = folder / "runs" / "store" / "teacher"
     assert "would remove" in command("gc", "--recipe", "second", "--dry-run").stdout
     assert len(list(teachers.iterdir())) == 2
-    assert command("gc", "--unused").stdout == "0 B in all\n"
-    assert command("gc", "--recipe", "second", "--older-than", "1").stdout == "0 B in all\n"
+    assert command("gc", "--unused").stdout == "0 bytes in all\n"
+    assert command("gc", "--recipe", "second", "--older-than", "1").stdout == "0 bytes in all\n"
     assert command("gc", "--recipe", "second").returncode == 0
     assert [path.name for path in teachers.iterdir()] == [key("first", "teacher")]
     assert "all stages are cached" in command("plan", "first.yaml").stdout
@@ -165,7 +165,7 @@ def test_a_run_with_overrides_leaves_the_recipes_name_to_what_it_had(folder: Pat
     assert command("run", "first.yaml", "--set", "seed=4").returncode == 0
     assert key("first", "teacher") == before
     assert before in command("show", "first/teacher").stdout
-    assert command("gc", "--unused").stdout == "0 B in all\n"
+    assert command("gc", "--unused").stdout == "0 bytes in all\n"
     assert command("run", "first.yaml", "--set", "seed=4").stdout.count(": cached") == 6
     assert command("run", "first.yaml").stdout.count(": cached") == 6
 
@@ -174,7 +174,7 @@ def test_gc_removes_what_was_used_long_ago_only_when_told_how_long(folder: Path,
     assert command("run", "first.yaml", "--set", "seed=4").returncode == 0
     teachers = folder / "runs" / "store" / "teacher"
     assert len(list(teachers.iterdir())) == 3
-    assert command("gc", "--unused", "--older-than", "1").stdout == "0 B in all\n"
+    assert command("gc", "--unused", "--older-than", "1").stdout == "0 bytes in all\n"
     assert command("gc", "--unused", "--older-than", "1e-9").returncode == 0
     assert {path.name for path in teachers.iterdir()} == {key("first", "teacher"), key("second", "teacher")}
 
@@ -243,7 +243,7 @@ def test_a_damaged_record_of_a_recipe_is_named_and_keeps_gc_from_removing(folder
         assert done.returncode == 2
         assert done.stderr == "runs/recipes/first.json is damaged; run the recipe again to remake it\n"
     assert command("run", "first.yaml").stdout.count(": cached") == 6
-    assert command("gc", "--unused").stdout == "0 B in all\n"
+    assert command("gc", "--unused").stdout == "0 bytes in all\n"
 
 
 @pytest.mark.parametrize("text", ["[]", '{"points": 3}', '{"points": [{}]}', "[" * 100_000])

@@ -58,7 +58,7 @@ def recorded(runs: Runs, environment: Mapping[str, str]) -> None:
 
 def test_the_columns_are_metrics_that_stages_leave() -> None:
     columns = view()["selectedColumns"]
-    for stage, names in ((name, stage.presentation.columns) for name, stage in STAGES.items()):
+    for stage, names in ((name, stage.columns) for name, stage in STAGES.items()):
         left = [json.loads(path.read_bytes())["metrics"] for path in PUBLISHED.glob(f"{stage}/*/summary.json")]
         for name in names:
             assert any(name in metrics for metrics in left), (stage, name)

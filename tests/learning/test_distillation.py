@@ -2,7 +2,7 @@ import numpy as np
 
 from iowbc.learning.distillation import ReplayBuffer, mirror_half, spread
 from iowbc.robot.mirror import MirrorMap
-from iowbc.rollouts.history import History
+from iowbc.rollouts.policies import History
 
 
 def test_a_sampled_history_is_the_one_that_the_student_saw() -> None:

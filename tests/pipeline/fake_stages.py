@@ -89,6 +89,7 @@ def stage(
     def known(recipe: Recipe) -> tuple[str, ...]:
         return tuple(read for read in reads if read in recipe.stages)
 
+    own = real.STAGES[name]
     return Stage(
         name,
         1,
@@ -97,8 +98,13 @@ def stage(
         run=counting(name),
         results=("result.json",),
         counts=counts,
-        borrows=real.STAGES[name].borrows,
-        presentation=real.STAGES[name].presentation,
+        borrows=own.borrows,
+        headline=own.headline,
+        columns=own.columns,
+        pictures=own.pictures,
+        curves=own.curves,
+        trained_by=own.trained_by,
+        leaves_policy=own.leaves_policy,
     )
 
 

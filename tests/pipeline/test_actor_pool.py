@@ -2,7 +2,7 @@
 
 import traceback
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import pytest
@@ -15,7 +15,7 @@ from ray import exceptions
 from iowbc.errors import Damaged, Interrupted, StageFailed, WorkerFailed
 from iowbc.pipeline.cluster.folders import SharedFolder
 from iowbc.pipeline.cluster.spread import TRIES, ActorHost, NodeActorPool
-from iowbc.pipeline.machine import identity
+from iowbc.pipeline.code import identity
 
 pytestmark = pytest.mark.unit
 
@@ -181,9 +181,9 @@ def test_what_a_member_raises_is_told_with_its_place(watch: Watch, request_: str
 
 def test_a_node_with_another_version_is_refused_with_both(watch: Watch) -> None:
     own = identity()
-    driver = replace(own, versions={**own.versions, "mujoco": "3.0"})
+    driver = {**own, "mujoco": "3.0"}
     watch.folders = {"robot": SharedFolder("", "", (), driver, copy=False)}
-    with pytest.raises(WorkerFailed, match=rf"mujoco 3\.0 here, {own.versions['mujoco']} on .*; install the same"):
+    with pytest.raises(WorkerFailed, match=rf"mujoco 3\.0 here, {own['mujoco']} on .*; install the same"):
         watch.added(watch.pool(10), 1)
 
 

@@ -15,7 +15,7 @@ from iowbc.errors import Damaged, StageFailed
 from iowbc.pipeline.cluster import folders, stage_task
 from iowbc.pipeline.cluster.folders import SharedFolder, files_of, placed, write_files
 from iowbc.pipeline.cluster.stage_task import NodeReport
-from iowbc.pipeline.machine import identity
+from iowbc.pipeline.code import identity, mismatch
 from iowbc.pipeline.store.digests import folder_digest
 
 
@@ -65,17 +65,15 @@ def test_what_arrives_otherwise_is_refused(source: SharedFolder, monkeypatch: py
 
 def test_a_machine_with_another_package_or_other_code_is_named_with_both(monkeypatch: pytest.MonkeyPatch) -> None:
     own = identity()
-    assert own.mismatch(identity()) == ""
-    other = replace(own, host="node7", versions={**own.versions, "mujoco": "3.0"}, code="f" * 64)
-    told = own.mismatch(other)
-    assert f"mujoco {own.versions['mujoco']} here, 3.0 on node7" in told
-    assert f"code {own.code[:12]} here, ffffffffffff on node7" in told
+    assert mismatch(own, identity()) == ""
+    told = mismatch(own, {**own, "host": "node7", "mujoco": "3.0", "code": "f" * 12})
+    assert f"mujoco {own['mujoco']} here, 3.0 on node7" in told
+    assert f"code {own['code']} here, ffffffffffff on node7" in told
 
 
 def test_a_node_that_is_not_as_the_driver_is_refused_with_both_versions(source: SharedFolder) -> None:
-    own = identity()
-    driver = replace(own, host="driver", versions={**own.versions, "mujoco": "3.0"}, code="f" * 64)
-    both = r"mujoco 3\.0 here, \d+\.\d+\.\d+ on .*; code ffffffffffff here, [0-9a-f]{12} on "
+    driver = {**identity(), "host": "driver", "mujoco": "3.0", "code": "f" * 12}
+    both = r"code ffffffffffff here, [0-9a-f]{12} on .*; mujoco 3\.0 here, \d+\.\d+\.\d+ on "
     with pytest.raises(StageFailed, match=rf"a node is not as the driver: {both}.*; install the same on both"):
         placed(replace(source, driver=driver))
 

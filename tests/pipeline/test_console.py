@@ -10,7 +10,7 @@ from rich.console import Console
 
 from iowbc.pipeline.console.display import CURVE_POINTS, PlainDisplay, StageView
 from iowbc.pipeline.console.live_table import LiveTable, sparkline
-from iowbc.pipeline.console.wording import short, size
+from iowbc.pipeline.console.wording import short
 from iowbc.pipeline.stop_request import StopRequest
 
 
@@ -142,8 +142,3 @@ def test_a_stop_that_the_live_table_shows_is_not_written_into_it(capfd: pytest.C
 def test_many_reasons_are_counted() -> None:
     assert short(["a", "b", "c"], 2) == "a\nb (and 1 more)"
     assert short(["a"], 2) == "a"
-
-
-@pytest.mark.parametrize(("count", "text"), [(812, "812 B"), (1200, "1.2 kB"), (3.4e6, "3.4 MB"), (5e9, "5.00 GB")])
-def test_a_size_is_told_for_people(count: float, text: str) -> None:
-    assert size(count) == text

@@ -83,8 +83,7 @@ def told(runs: Runs) -> Path:
 
 def delivered(runs: Runs, path: Path, server: Server, monkeypatch: pytest.MonkeyPatch) -> None:
     """Send with a new sender after each failure, as after a death."""
-    monkeypatch.setattr(module, "client", lambda uri: server)
-    monkeypatch.setattr(module, "experiment", lambda client, name, runs: "0")
+    monkeypatch.setattr(module, "open_experiment", lambda runs, uri, name: (server, "0"))
     for _ in range(3):
         if Delivery(runs, path).advance():
             return

@@ -14,7 +14,7 @@ from iowbc.commands.ui import view
 from iowbc.learning.curves import Curves
 from iowbc.pipeline.planner import planner_for
 from iowbc.pipeline.runner import Runner
-from iowbc.pipeline.stage import Job, Presentation, Stage
+from iowbc.pipeline.stage import Job, Stage
 from iowbc.pipeline.stage_plan import Options
 from iowbc.pipeline.store.workspace import Workspace
 from iowbc.recipe import recipe as recipes
@@ -55,9 +55,11 @@ STAGE = Stage(
     slice=("seed", "juggle"),
     reads=lambda recipe: ("rg-fit",),
     run=juggle,
-    presentation=Presentation(
-        headline=("balls",), columns=("balls",), curves=("balls",), trained_by="juggling", leaves_policy=True
-    ),
+    headline=("balls",),
+    columns=("balls",),
+    curves=("balls",),
+    trained_by="juggling",
+    leaves_policy=True,
 )
 
 

@@ -1,6 +1,7 @@
 """A plan says what would run and why, with the recipe's line, the old value and the new one."""
 
 import dataclasses
+import hashlib
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from iowbc.pipeline.code import stage_code
 from iowbc.pipeline.console.wording import duration
 from iowbc.pipeline.stage import slice_value
 from iowbc.pipeline.store.artifact import MANIFEST, Manifest, write_manifest
-from iowbc.pipeline.store.digests import canonical_json, data_digest, syntax_digest
+from iowbc.pipeline.store.digests import data_digest, syntax_digest
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.workspace import Workspace
 
@@ -291,7 +292,8 @@ def test_comments_and_docstrings_are_not_code(tmp_path: Path) -> None:
 
 def test_a_key_does_not_depend_on_the_order_of_what_is_hashed() -> None:
     assert data_digest({"a": 1, "b": [1.0, None]}) == data_digest({"b": [1.0, None], "a": 1})
-    assert canonical_json({"b": "é", "a": 1e-3}) == '{"a":0.001,"b":"\\u00e9"}'
+    written = b'{"a":0.001,"b":"\\u00e9"}'
+    assert data_digest({"b": "é", "a": 1e-3}) == hashlib.sha256(written).hexdigest()
     with pytest.raises(ValueError, match="not JSON compliant"):
         data_digest(float("nan"))
 

@@ -1,6 +1,6 @@
 import numpy as np
 
-from iowbc.rollouts.history import History
+from iowbc.rollouts.policies import History
 
 
 def test_an_episode_begins_with_copies_of_its_first_observation() -> None:

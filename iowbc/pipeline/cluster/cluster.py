@@ -13,7 +13,7 @@ from iowbc.errors import Interrupted, IowbcError, StageFailed
 from iowbc.pipeline.cluster.folders import Files, SharedFolder, files_of, write_files
 from iowbc.pipeline.cluster.spread import POLL, TRIES, NodeSpread, raised
 from iowbc.pipeline.cluster.stage_task import Event, Mailbox, execute, marker
-from iowbc.pipeline.machine import identity
+from iowbc.pipeline.code import identity
 from iowbc.pipeline.stage import Job, Stage
 from iowbc.pipeline.store.digests import folder_digest
 

@@ -7,7 +7,6 @@ import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import closing, contextmanager, suppress
-from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 from iowbc.errors import UsageError
@@ -40,8 +39,6 @@ def connected(address: str, *, copy: bool) -> "Iterator[Cluster]":
 
     address: `local`, `auto`, `host:port` or `ray://host:port`. copy: see `Cluster`.
     """
-    if find_spec("ray") is None:
-        raise UsageError("Ray is needed, which this installation leaves out: `pip install 'iowbc[cluster]'`")
     for name, value in SETTINGS.items():
         os.environ.setdefault(name, value)
     if address == LOCAL:

@@ -12,7 +12,7 @@ import ray
 
 from iowbc.errors import Damaged, StageFailed
 from iowbc.files import replacing
-from iowbc.pipeline.machine import Identity, identity
+from iowbc.pipeline.code import identity, mismatch
 from iowbc.pipeline.store.digests import folder_digest, folder_files
 from iowbc.pipeline.store.locks import named_lock
 
@@ -30,7 +30,8 @@ class SharedFolder:
     """Digest of file names and contents."""
     content: tuple[Any, ...]
     """Ray's reference to its files; inside a tuple, so that Ray does not fetch it unless requested."""
-    driver: Identity
+    driver: Mapping[str, str]
+    """Its `identity()`."""
     copy: bool
     """True if a node uses a local copy even where it sees the driver's folder."""
 
@@ -53,7 +54,7 @@ def placed(folder: SharedFolder) -> Path:
     The copy is cached for later stages under the folder's own name, which is the key of an artifact. Raises
     `StageFailed` if code or package versions differ from the driver's, `Damaged` if the transferred content differs.
     """
-    if different := folder.driver.mismatch(identity()):
+    if different := mismatch(folder.driver, identity()):
         raise StageFailed(f"a node is not as the driver: {different}; install the same on both")
     there = Path(folder.path)
     if not folder.copy and there.is_dir() and folder_digest(there) == folder.digest:

@@ -13,7 +13,6 @@ import ray
 
 from iowbc.errors import Interrupted, IowbcError, StageFailed, WorkerFailed
 from iowbc.pipeline.cluster.folders import SharedFolder, placed
-from iowbc.pipeline.stage import Member
 
 Result = TypeVar("Result")
 TRIES = 5
@@ -29,11 +28,15 @@ def raised(error: Exception) -> BaseException | None:
 
 
 class ActorHost:
-    """Ray's actor on a node: one member, made at its first request."""
+    """Ray's actor on a node: one member, made at its first request.
 
-    def __init__(self, make: Callable[[], Member]) -> None:
+    A member is any object with `ask(message)`, which returns the answer, `state()`, its complete state, and
+    `restore(state)`, so that it can be remade elsewhere.
+    """
+
+    def __init__(self, make: Callable[[], Any]) -> None:
         self._make = make
-        self._member: Member | None = None
+        self._member: Any = None
 
     def ask(self, state: Any, message: Any, changes: bool) -> tuple[Any, Any]:
         """The answer, and the new state if it changes. `state`: initial state of a member that is created now."""
@@ -49,7 +52,7 @@ class ActorHost:
 class Place:
     """A member's actor, and its last request, state and answer."""
 
-    make: Callable[[], Member]
+    make: Callable[[], Any]
     actor: Any = None
     made: bool = False
     """True once this actor has answered: it holds its state itself."""
@@ -68,7 +71,7 @@ class NodeActorPool:
     def __init__(
         self,
         called: str,
-        make: Callable[..., Member],
+        make: Callable[..., Any],
         calls: Sequence[tuple[Any, ...]],
         folders: Mapping[str, SharedFolder],
         interrupted: Callable[[], bool],
@@ -181,7 +184,7 @@ class NodeSpread:
                 ray.cancel(task, force=True)
 
     def actor_pool(
-        self, called: str, make: Callable[..., Member], calls: Sequence[tuple[Any, ...]], folders: Mapping[str, Path]
+        self, called: str, make: Callable[..., Any], calls: Sequence[tuple[Any, ...]], folders: Mapping[str, Path]
     ) -> NodeActorPool:
         """Members on any nodes, made by a function of a module from each of these arguments and
         `folders`, as above. `called`: the members' name in messages."""

@@ -71,7 +71,11 @@ class LiveTable(Display):
 
     def _drawn(self) -> Constrain:
         width = self.console.width
-        notes = [_note(view) for view in self._views if view.note] if width >= WITH_NOTES else []
+        notes = [
+            Text(f"{view.name}: {view.note}", style="dim", no_wrap=True, overflow="ellipsis")
+            for view in self._views
+            if view.note and width >= WITH_NOTES
+        ]
         stopping = [Text(self._stopping(), style="magenta")] if self._stopping() else []
         return Constrain(Group(self._table(width), *notes, *stopping), width - ECHO)
 
@@ -97,11 +101,6 @@ def _row(view: StageView) -> tuple[Text | ProgressBar | str, ...]:
     done = f"{100 * view.share:.0f} %" if view.total else ""
     left = "finishing" if view.share == 1.0 else duration(view.left)
     return Text(view.name), state, bar, done, duration(view.spent), left, pace(view.rate)
-
-
-def _note(view: StageView) -> Text:
-    """A stage's note in one line."""
-    return Text(f"{view.name}: {view.note}", style="dim", no_wrap=True, overflow="ellipsis")
 
 
 def _curve(view: StageView, room: int) -> Text:

@@ -1,4 +1,4 @@
-"""Human-readable time spans, numbers, sizes and lists of reasons."""
+"""Human-readable time spans, numbers and lists of reasons."""
 
 import time
 from collections.abc import Sequence
@@ -41,12 +41,3 @@ def figure(value: float, digits: int = 4, sign: str = "") -> str:
     """A number: `2,402,304` where it is whole or large, else with so many digits; with `sign` "+", also its sign."""
     written_out = value == round(value, 0) or abs(value) >= 1000
     return f"{value:{sign},.0f}" if written_out and abs(value) < 1e12 else f"{value:{sign}.{digits}g}"
-
-
-def size(count: float) -> str:
-    """A number of bytes: `812 B`, `1.2 MB`."""
-    for unit in ("B", "kB", "MB"):
-        if count < 1000:
-            return f"{count:.0f} {unit}" if unit == "B" else f"{count:.1f} {unit}"
-        count /= 1000
-    return f"{count:.2f} GB"

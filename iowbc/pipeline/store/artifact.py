@@ -68,10 +68,6 @@ class Manifest(BaseModel):
     seal: str = ""
     """Digest of all of the above."""
 
-    def sealed(self) -> "Manifest":
-        """The manifest with its seal."""
-        return self.model_copy(update={"seal": data_digest(self.model_dump(mode="json", exclude={"seal"}))})
-
 
 @dataclass(frozen=True)
 class Artifact:
@@ -91,10 +87,7 @@ class Artifact:
     def ingredients(self) -> dict[str, Any]:
         """Ingredients of its key; empty where they are not readable or do not give the key."""
         found = read_json(self.folder / INGREDIENTS)
-        try:
-            return found if data_digest(found) == self.manifest.key else {}
-        except ValueError:
-            return {}
+        return found if _has_digest(found, self.manifest.key) else {}
 
     @property
     def recipe(self) -> dict[str, Any]:
@@ -180,7 +173,8 @@ def seal(
 
 def write_manifest(folder: Path, manifest: Manifest) -> None:
     """Seal and write a manifest; call it after all other files are written."""
-    write_whole(folder / MANIFEST, manifest.sealed().model_dump_json(indent=1))
+    seal = data_digest(manifest.model_dump(mode="json", exclude={"seal"}))
+    write_whole(folder / MANIFEST, manifest.model_copy(update={"seal": seal}).model_dump_json(indent=1))
 
 
 def read_artifact(folder: Path, stage: str, key: str, *, published: bool = False) -> Artifact:
@@ -188,7 +182,7 @@ def read_artifact(folder: Path, stage: str, key: str, *, published: bool = False
     if not (folder / MANIFEST).is_file():
         raise Damaged(f"{MANIFEST} is missing")
     found = read_json(folder / MANIFEST)
-    whole = _sealed(found)
+    whole = _has_digest({name: entry for name, entry in found.items() if name != "seal"}, found.get("seal"))
     try:
         manifest = Manifest.model_validate(found)
     except ValidationError:
@@ -201,11 +195,11 @@ def read_artifact(folder: Path, stage: str, key: str, *, published: bool = False
     return Artifact(folder, manifest, published)
 
 
-def _sealed(found: Mapping[str, Any]) -> bool:
-    """True for a manifest as it was written, also by a newer version with more entries."""
+def _has_digest(data: Mapping[str, Any], digest: str | None) -> bool:
+    """True for data as they were written, also by a newer version with more entries; False for damaged ones."""
     try:
-        return bool(data_digest({name: entry for name, entry in found.items() if name != "seal"}) == found.get("seal"))
-    except ValueError:
+        return data_digest(data) == digest
+    except ValueError:  # a damaged number may be NaN
         return False
 
 

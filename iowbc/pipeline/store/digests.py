@@ -14,14 +14,10 @@ PACKAGE = Path(__file__).parents[2]
 """Folder of this package."""
 
 
-def canonical_json(data: Any) -> str:
-    """Canonical JSON of the data: sorted keys, no spaces, no NaN."""
-    return json.dumps(data, sort_keys=True, separators=(",", ":"), ensure_ascii=True, allow_nan=False)
-
-
 def data_digest(data: Any) -> str:
-    """SHA-256 of the data's canonical JSON, hexadecimal."""
-    return hashlib.sha256(canonical_json(data).encode()).hexdigest()
+    """SHA-256 of the data's canonical JSON (sorted keys, no spaces, ASCII), hexadecimal. Raises ValueError for NaN."""
+    text = json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def content_digest(files: Mapping[str, str]) -> str:

@@ -67,28 +67,22 @@ def _read(path: Path, parsed: Callable[[str], Any]) -> dict[str, Any]:
 def require_writable_runs(runs: Runs) -> None:
     """Make the folder of runs where it is missing. Raises `UsageError` where it, or a part of it, cannot be written."""
     parts = (runs.store, *runs.store.glob("*"), runs.work, runs.damaged, runs.locks, runs.recipes, runs.tracking)
-    reason = obstacle(runs.root) or next(filter(None, map(_closed, parts)), "")
-    if reason:
-        raise UsageError(f"{runs.root} cannot be written: {reason}; {_remedy(runs.root, '--runs')}")
+    require_writable(runs.root, "--runs", next(filter(None, map(_closed, parts)), ""))
 
 
-def require_writable(folder: Path, option: str) -> None:
-    """Make a folder that an option names. Raises `UsageError` where it cannot be written."""
-    reason = obstacle(folder)
-    if reason:
-        raise UsageError(f"{folder} cannot be written: {reason}; {_remedy(folder, option)}")
-
-
-def _remedy(folder: Path, option: str) -> str:
-    """Advice for a folder that cannot be written: chown for another user's runs, else another folder."""
-    there = next((path for path in (folder, *folder.parents) if path.exists()), folder)
-    owner, user = there.stat().st_uid, os.geteuid()
-    if option != "--runs" or owner == user or there != folder or not folder.is_dir():
-        return f"give another folder with {option}"
-    return (
-        f"it belongs to user {owner} and this is user {user}: on the machine that it lies on (not inside a container) "
-        f"say `sudo chown -R {user} {folder.name}`, or give another folder with {option}"
-    )
+def require_writable(folder: Path, option: str, closed: str = "") -> None:
+    """Make a folder that an option names. Raises `UsageError` where it cannot be written, or a part of it is `closed`
+    for a reason; the advice is chown for another user's runs, else another folder."""
+    reason = obstacle(folder) or closed
+    if not reason:
+        return
+    advice, user = f"give another folder with {option}", os.geteuid()
+    if option == "--runs" and folder.is_dir() and (owner := folder.stat().st_uid) != user:
+        advice = (
+            f"it belongs to user {owner} and this is user {user}: on the machine that it lies on (not inside a "
+            f"container) say `sudo chown -R {user} {folder.name}`, or {advice}"
+        )
+    raise UsageError(f"{folder} cannot be written: {reason}; {advice}")
 
 
 def obstacle(folder: Path) -> str:

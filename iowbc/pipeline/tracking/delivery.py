@@ -11,7 +11,6 @@ import shutil
 import sys
 import time
 from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -51,7 +50,8 @@ class Delivery:
         self._checked = -1
         """Size of the journal when its process was found dead and its runs were ended."""
         self._finished = False
-        self._client: MlflowClient | None = None
+        self._client: Any = None
+        """MLflow's client of the store or server that the journal names."""
         self._embedded = False
         """True where it goes to the database in `runs`."""
         self._experiment = ""
@@ -80,22 +80,14 @@ class Delivery:
             return False
         return True
 
-    @property
-    def client(self) -> "MlflowClient":
-        """The store or server that the journal names."""
-        assert self._client is not None
-        return self._client
-
     def _connect(self) -> None:
         if self._client is None:
             first = header(self.path)
-            own, uri = embedded_uri(self.runs), str(first.get("uri", tracking_uri()))
-            made = client(uri or own)
-            self._embedded = uri in ("", own)
+            own = embedded_uri(self.runs)
+            uri = str(first.get("uri", tracking_uri())) or own
+            self._embedded = uri == own
             name = first.get("experiment") or Execution.model_fields["experiment"].default
-            with setup_lock(self.runs):
-                self._experiment = experiment(made, str(name), self.runs)
-            self._client = made
+            self._client, self._experiment = open_experiment(self.runs, uri, str(name))
 
     def _send(self) -> None:
         """Send event by event; neighbouring metrics of a run go together."""
@@ -122,21 +114,27 @@ class Delivery:
 
     def _deliver(self, found: Sequence[dict[str, Any]]) -> None:
         """Send one event, or several with metrics of one run; MLflow's refusal is noted, and they are left out."""
+        from mlflow.entities import Metric
         from mlflow.exceptions import MlflowException
 
         event, kind = found[0], found[0]["event"]
         try:
             run = self._run_of(event)
             if kind == "metrics":
-                self._metrics(run, found)
+                metrics = [
+                    Metric(name, value, one["time"], one["step"])
+                    for one in found
+                    for name, value in one["values"].items()
+                ]
+                self._client.log_batch(run, metrics=metrics)
             elif kind in ("reopen", "tags"):
                 if kind == "reopen":
-                    self.client.update_run(run, status="RUNNING")
+                    self._client.update_run(run, status="RUNNING")
                 self._describe(run, event["tags"], {})
             elif kind == "files":
                 self._files(run, event["paths"])
             elif kind == "end":
-                self.client.set_terminated(run, event["status"], event["time"])
+                self._client.set_terminated(run, event["status"], event["time"])
         except MlflowException as error:
             if error.error_code not in REFUSALS:
                 raise
@@ -161,37 +159,28 @@ class Delivery:
         """MLflow's run for an identifier in this journal, or for `JOURNAL/IDENTIFIER`; created if there is none."""
         origin = identifier if "/" in identifier else f"{self.path.stem}/{identifier}"
         condition = f"tags.`{ORIGIN_TAG}` = '{origin}'"
-        found = self.client.search_runs([self._experiment], condition, max_results=1)
+        found = self._client.search_runs([self._experiment], condition, max_results=1)
         if found:
             return str(found[0].info.run_id)
         tags = {ORIGIN_TAG: origin}
-        made = self.client.create_run(self._experiment, start_time=moment, tags=tags, run_name=name)
+        made = self._client.create_run(self._experiment, start_time=moment, tags=tags, run_name=name)
         return str(made.info.run_id)
 
     def _describe(self, run: str, tags: Mapping[str, str], params: Mapping[str, str]) -> None:
         from mlflow.entities import Param, RunTag
 
-        if tags:
-            self.client.log_batch(run, tags=[RunTag(name, text[:MAXIMUM_TEXT]) for name, text in tags.items()])
-        if params:
-            self.client.log_batch(run, params=[Param(name, text[:MAXIMUM_TEXT]) for name, text in params.items()])
-
-    def _metrics(self, run: str, found: Sequence[Mapping[str, Any]]) -> None:
-        from mlflow.entities import Metric
-
-        metrics = [
-            Metric(name, value, event["time"], event["step"])
-            for event in found
-            for name, value in event["values"].items()
-        ]
-        self.client.log_batch(run, metrics=metrics)
+        self._client.log_batch(
+            run,
+            params=[Param(name, text[:MAXIMUM_TEXT]) for name, text in params.items()],
+            tags=[RunTag(name, text[:MAXIMUM_TEXT]) for name, text in tags.items()],
+        )
 
     def _files(self, run: str, names: Sequence[str]) -> None:
         """Send files and folders below `runs`; for the embedded database copy them to MLflow's artifact folder."""
         folder = self.runs.tracked_files / run / "artifacts"
         for path in (self.runs.root / name for name in names):
             if path.exists() and not self._embedded:
-                self.client.log_artifact(run, str(path))
+                self._client.log_artifact(run, str(path))
             elif path.is_dir():
                 shutil.copytree(path, folder / path.name, dirs_exist_ok=True)
             elif path.is_file():
@@ -204,27 +193,19 @@ def tracking_uri() -> str:
     return os.environ.get(URI_VARIABLE, "")
 
 
-def setup_lock(runs: Runs) -> AbstractContextManager[None]:
-    """Lock for setting up the database or an experiment, which MLflow does not protect against concurrency."""
-    return named_lock(runs.tracking / "setup.lock")
-
-
-def client(uri: str) -> "MlflowClient":
-    """A client of a tracking store or server."""
+def open_experiment(runs: Runs, uri: str, name: str) -> "tuple[MlflowClient, str]":
+    """A client of a tracking store or server, and the identifier of an experiment there, created if missing; files of
+    an SQLite store lie under `runs/`. One process at a time: MLflow does not protect the set-up of a database."""
     from mlflow.tracking import MlflowClient
 
-    return MlflowClient(tracking_uri=uri)
-
-
-def experiment(client: "MlflowClient", name: str, runs: Runs) -> str:
-    """Identifier of an experiment, created if missing; files of an SQLite store lie under `runs/`."""
-    found = client.get_experiment_by_name(name)
-    if found is not None:
-        return str(found.experiment_id)
-    location = runs.tracked_files.absolute().as_uri() if client.tracking_uri.startswith("sqlite:") else None
-    if client.tracking_uri == embedded_uri(runs):
-        location = SERVED
-    return str(client.create_experiment(name, artifact_location=location))
+    client = MlflowClient(tracking_uri=uri)
+    with named_lock(runs.tracking / "setup.lock"):
+        if (found := client.get_experiment_by_name(name)) is not None:
+            return client, str(found.experiment_id)
+        location = runs.tracked_files.absolute().as_uri() if uri.startswith("sqlite:") else None
+        if uri == embedded_uri(runs):
+            location = SERVED
+        return client, str(client.create_experiment(name, artifact_location=location))
 
 
 def embedded_uri(runs: Runs) -> str:
