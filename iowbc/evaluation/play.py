@@ -110,7 +110,7 @@ def open_policy(source: Source, environment: VectorEnv) -> Policy:
     if (source.policy / exported_folder.CONTRACT).is_file():
         return ExportedPolicy(Controller.load(source.policy, robots=environment.num_envs), environment)
     if source.policy.is_dir():
-        return load_policy(source.policy)
+        return load_policy(source.policy, environment.layout.describe())
     mirrors = (environment.layout.mirror, action_mirror(load_robot(source.world.robot)))
     return unfinished_policy(source.policy, source.key, source.world.recipe.teacher, mirrors)
 

@@ -13,7 +13,7 @@ from iowbc.errors import Damaged
 from iowbc.files import previous, read_checked
 from iowbc.learning.checkpoint import under
 from iowbc.learning.networks import Mirrors, StudentNetwork, TeacherNetwork
-from iowbc.learning.storage import Network, load_network
+from iowbc.learning.storage import Network, load_network, require_layout
 from iowbc.learning.trained import trained_network
 from iowbc.recipe.teacher import Teacher
 from iowbc.rollouts.policies import History
@@ -71,9 +71,12 @@ class StudentPolicy:
         return np.asarray(mean.numpy(), np.float32)
 
 
-def load_policy(folder: Path) -> Policy:
-    """The policy in the artifact of `teacher` or `distill`. Raises FileNotFoundError where there is none."""
+def load_policy(folder: Path, layout: Mapping[str, Any] | None = None) -> Policy:
+    """The policy in the artifact of `teacher` or `distill`. Raises FileNotFoundError where there is none, and
+    StageFailed if it was trained on other parts than those of the `layout` that it will receive."""
     network, about = load_network(folder)
+    if layout is not None:
+        require_layout(folder, about, layout)
     return policy_of(network, about["architecture"])
 
 

@@ -1,7 +1,7 @@
 """Trained networks on disk: safetensors for the weights, JSON for the architecture, no pickle."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +40,20 @@ def load_network(folder: Path, names: Sequence[str] = NAMES) -> tuple[Network, d
     network.load_state_dict(load_file(path.with_suffix(".safetensors")))
     network.requires_grad_(False)
     return network.eval(), about
+
+
+def require_layout(folder: Path, about: Mapping[str, Any], layout: Mapping[str, Any]) -> None:
+    """Raises StageFailed if a network of `load_network` was trained on other parts than it would receive. `layout`: the
+    parts of s_t and of s_priv, as `FullLayout` describes them; a student receives the first of s_t."""
+    kinds = ("observation",) if about["kind"] == "student" else ("observation", "privileged")
+    for kind in kinds:
+        own, given = ([(part["name"], part["size"]) for part in parts[kind]] for parts in (about["layout"], layout))
+        if own != (given[: len(own)] if about["kind"] == "student" else given):
+            differ = ", ".join(f"{name} ({size})" for name, size in sorted(set(own) ^ set(given))) or "their order"
+            raise StageFailed(
+                f"{folder}: this policy was trained on another {kind}; what differs: {differ}. Use the code and the "
+                "task.observation with which it was trained, or train it again (`iowbc run RECIPE --force STAGE`)"
+            )
 
 
 def load_teacher(folder: Path, name: str = "teacher") -> tuple[TeacherNetwork, dict[str, Any]]:

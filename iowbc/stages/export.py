@@ -75,12 +75,14 @@ def _graph(job: Job, student: "StudentNetwork", about: Mapping[str, Any]) -> "Co
     from iowbc.control.observation import OBJECT, observation_layout
     from iowbc.control.references import ReferenceLayer
     from iowbc.export.graph import ControllerGraph
+    from iowbc.learning.storage import require_layout
     from iowbc.robot.description import load_robot
 
     robot, task = load_robot(job.robot), job.recipe.task
     sees_object = OBJECT[0].name in {part["name"] for part in about["layout"]["observation"]}
     references = ReferenceLayer(robot, task.references, job.inputs.get("rg-fit"))
     layout, history = observation_layout(robot, sees_object), int(about["architecture"]["history"])
+    require_layout(job.inputs[policy_stage(job.recipe)], about, {"observation": layout.describe()})
     return ControllerGraph(student, robot, task, layout, history, references)
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import torch
 
+from iowbc.errors import StageFailed
 from iowbc.learning.acting import StudentPolicy, load_policy
 from iowbc.learning.networks import StudentNetwork
 from iowbc.learning.storage import load_network, save_network
@@ -33,6 +34,20 @@ def test_a_missing_network_names_the_path_and_what_is_there(tmp_path: Path) -> N
     (tmp_path / "other.json").write_text("{}")
     with pytest.raises(FileNotFoundError, match=r"student\.json.*other\.json"):
         load_policy(tmp_path)
+
+
+def parts(**sizes: int) -> list[dict[str, object]]:
+    return [{"name": name, "size": size} for name, size in sizes.items()]
+
+
+def test_a_student_is_refused_where_it_would_observe_something_else(tmp_path: Path) -> None:
+    about = {"layout": {"observation": parts(tilt=1, joints=2), "privileged": []}}
+    save_network(StudentNetwork(**ARCHITECTURE), ARCHITECTURE, tmp_path, "student", about)  # type: ignore[arg-type]
+    load_policy(tmp_path, {"observation": parts(tilt=1, joints=2, box=4), "privileged": parts(mass=1)})
+    with pytest.raises(StageFailed, match=r"what differs: torque \(2\)"):
+        load_policy(tmp_path, {"observation": parts(tilt=1, torque=2, joints=2), "privileged": []})
+    with pytest.raises(StageFailed, match="their order"):
+        load_policy(tmp_path, {"observation": parts(joints=2, tilt=1), "privileged": []})
 
 
 def test_after_a_reset_the_student_forgets_what_it_saw(tmp_path: Path) -> None:

@@ -25,6 +25,7 @@ from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.scene_names import with_scenes
 from iowbc.recipe.task.joint_references import Grasps, Loads
 from iowbc.robot.description import load_robot
+from iowbc.task.layout import full_layout
 from iowbc.task.specification import Specification
 from iowbc.task.vector.setup import shares
 
@@ -66,9 +67,9 @@ def _with_trial_scenes(recipe: Recipe) -> Recipe:
 def evaluated_policy(world: Specification, folder: Path | None) -> Policy:
     """The policy of `eval.policy`: a trained policy, the model-based baseline, or a public controller; `folder`:
     artifact of the stage that trained it, or None."""
-    if folder is not None:
-        return load_policy(folder)
     robot, recipe = load_robot(world.robot), world.recipe
+    if folder is not None:
+        return load_policy(folder, full_layout(recipe, robot).describe())
     if recipe.eval.public is not None:
         from iowbc.adapters.policy import AdaptedPolicy
         from iowbc.adapters.source import load_adapter
