@@ -148,15 +148,18 @@ def _world(recipe: Recipe) -> Iterator[Workload]:
     sweep = planned_sweeps(recipe)[0]
     with generator_of(folder, recipe) as generator, tempfile.TemporaryDirectory() as place:
         robot = load_robot(folder)
+        layout = full_layout(recipe, robot)
         architecture: dict[str, Any] = {
-            "inputs": full_layout(recipe, robot).size,
+            "inputs": layout.size,
             "actions": len(robot.support),
             "hidden": list(recipe.teacher.hidden),
             "activation": recipe.teacher.activation,
             "clip": 10.0,
         }
         torch.manual_seed(0)
-        save_network(TeacherNetwork(**architecture), architecture, Path(place), "teacher", {})
+        save_network(
+            TeacherNetwork(**architecture), architecture, Path(place), "teacher", {"layout": layout.describe()}
+        )
         folders = {"robot": folder, "policy": Path(place), "generator": generator}
         yield Workload(recipe, folders, sweep.trials(sweep.sweep.masses[-1:]))
 

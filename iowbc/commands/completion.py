@@ -3,27 +3,30 @@
 import os
 from collections.abc import Iterable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from iowbc.commands.lookup import known_names
-from iowbc.pipeline.nested import flattened
-from iowbc.pipeline.store.runs import Runs
-from iowbc.pipeline.store.store import Store
-from iowbc.recipe.reading.loading import known_files
-from iowbc.recipe.recipe import PIPELINE, Recipe
+if TYPE_CHECKING:
+    from iowbc.pipeline.store.store import Store
 
 
 def recipes(incomplete: str) -> list[str]:
     """Recipes that can be run by name; a path is the shell's own business."""
+    from iowbc.recipe.reading.loading import known_files
+
     return _beginning(incomplete, (path.stem for path in known_files()))
 
 
 def ran(incomplete: str) -> list[str]:
     """Recipes that have run, or are published."""
+    from iowbc.commands.lookup import known_names
+
     return _beginning(incomplete, known_names(_store()))
 
 
 def artifacts(incomplete: str) -> list[str]:
     """Recipes that have run or are published, `RECIPE/STAGE`, and, once something is typed, keys."""
+    from iowbc.commands.lookup import known_names
+
     store = _store()
     known = known_names(store)
     stages = [f"{name}/{stage}" for name, found in known.items() for stage in found]
@@ -33,15 +36,23 @@ def artifacts(incomplete: str) -> list[str]:
 
 def stages(incomplete: str) -> list[str]:
     """Names of stages."""
+    from iowbc.recipe.recipe import PIPELINE
+
     return _beginning(incomplete, PIPELINE)
 
 
 def paths(incomplete: str) -> list[str]:
     """Dotted paths of a recipe's values, with the sign that a value follows."""
+    from iowbc.pipeline.nested import flattened
+    from iowbc.recipe.recipe import Recipe
+
     return _beginning(incomplete, (f"{path}=" for path in flattened(Recipe(name="any").model_dump(mode="json"))))
 
 
-def _store() -> Store:
+def _store() -> "Store":
+    from iowbc.pipeline.store.runs import Runs
+    from iowbc.pipeline.store.store import Store
+
     return Store(Runs(Path(os.environ.get("IOWBC_RUNS", "runs"))))
 
 

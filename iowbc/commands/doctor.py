@@ -138,7 +138,9 @@ def _packages() -> Iterator[Finding]:
 def _robots() -> Iterator[Finding]:
     from iowbc.robot.description import load_robot, robot_folders
 
-    for folder in robot_folders().values():
+    if not (folders := robot_folders()):
+        yield Finding("robot", "bad", "no description of any robot is there; install iowbc again")
+    for folder in folders.values():
         try:
             robot = load_robot(folder)
         except (OSError, ValueError) as error:

@@ -9,7 +9,7 @@ import typer
 from rich.filesize import decimal
 
 from iowbc.commands import completion, options
-from iowbc.commands.play import playable
+from iowbc.commands.lookup import named
 from iowbc.commands.printed import shown_path, stdout_console, tell
 from iowbc.deploy.exported_folder import CONTRACT
 from iowbc.errors import UsageError
@@ -32,7 +32,13 @@ def export(
     """Write the web page of an exported controller, and print how to open it. Raises `UsageError`."""
     options.require_extra("train", "iowbc export")
     store = Store(Runs(runs))
-    exported = Path(word) if os.path.isfile(Path(word, CONTRACT)) else playable(store, word, "export").folder
+    exported = Path(word)
+    if not os.path.isfile(exported / CONTRACT):
+        if (made := named(store, word).usable.get("export")) is None:
+            raise UsageError(
+                f"{word}: no exported controller; run a recipe that ends with `export`, or give the folder that it made"
+            )
+        exported = made.folder
     if folder.is_dir() and any(folder.iterdir()) and not (folder / "scenes.json").is_file():
         raise UsageError(f"--web {folder}: holds other files; give an empty folder, or one that this command has made")
     require_writable(folder, "--web")

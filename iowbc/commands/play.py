@@ -122,14 +122,15 @@ def play_on_web(store: Store, console: Console, word: str, stage: str | None, re
         there = f"ssh -L {port}:{options.HOST}:{port} THIS_MACHINE"
         console.print(f"(from another machine: {there}, and the same address there)", markup=False, highlight=False)
 
-    skill = skill_to_play(store, word, stage)
+    plan = planned(store, word)
+    skill = skill_to_play(store, word, stage, plan)
     if skill is not None:
         from iowbc.live.game import GamePanel
 
         with _game(store, console, skill, request) as game, serving(port) as server:
             Page(server, game, panel=GamePanel).run(ready)
         return
-    source, actor = _driven(store, console, word, stage)
+    source, actor = _driven(store, console, word, stage, plan)
 
     from iowbc.live.session import Session
 
@@ -146,11 +147,11 @@ def planned(store: Store, word: str) -> Planned:
     return Planned(loaded.recipe, {step.stage.name: step.artifact for step in steps if step.cached and step.artifact})
 
 
-def skill_to_play(store: Store, word: str, stage: str | None) -> Artifact | None:
+def skill_to_play(store: Store, word: str, stage: str | None, plan: Planned) -> Artifact | None:
     """The skill that a word and `--stage` name; None where they name no skill, or another stage."""
     if stage not in (None, SKILL) or Path(word).is_dir():
         return None
-    if (plan := planned(store, word)).recipe is not None:
+    if plan.recipe is not None:
         return plan.artifacts.get(SKILL)
     with contextlib.suppress(UsageError):  # a first training has nothing finished yet
         return named(store, word).usable.get(SKILL)
@@ -172,10 +173,13 @@ def _game(store: Store, console: Console, skill: Artifact, request: PlayRequest)
     require_known(request.scene, "scene with a transport task", first)
     tell(console, f"skill of {skill.manifest.recipe}: you are its partner")
     robot, asked = load_teacher(skill.folder, "robot")[0], GameRequest(first[request.scene], request.seed)
-    return GameSession(world_of(skill.recipe, generator).deployed, load_student(student.folder), robot, asked)
+    world = world_of(skill.recipe, generator).deployed
+    return GameSession(world, load_student(student.folder, world), robot, asked)
 
 
-def _driven(store: Store, console: Console, word: str, stage: str | None) -> "tuple[Source, Actor | None]":
+def _driven(
+    store: Store, console: Console, word: str, stage: str | None, plan: Planned
+) -> "tuple[Source, Actor | None]":
     """The policy to drive by hand, and the trials of its evaluation."""
     found: Mapping[str, Artifact] = {}
     if not Path(word).is_dir():
@@ -187,7 +191,7 @@ def _driven(store: Store, console: Console, word: str, stage: str | None) -> "tu
         require_whole(store.runs, [played])
         source = _whole_source(store, played)
     else:
-        source = named_source(store, console, word, stage)
+        source = named_source(store, console, word, stage, plan=plan)
     try:
         return source, None if evaluation is None else evaluated_actor(store, evaluation)
     except UsageError as error:
@@ -195,9 +199,16 @@ def _driven(store: Store, console: Console, word: str, stage: str | None) -> "tu
         return source, None
 
 
-def named_source(store: Store, console: Console, word: str, stage: str | None, scene: str | None = None) -> "Source":
+def named_source(
+    store: Store,
+    console: Console,
+    word: str,
+    stage: str | None,
+    scene: str | None = None,
+    plan: Planned | None = None,
+) -> "Source":
     """The source that a word and `--stage` denote; prints a line if it is still in training. Raises `UsageError`, also
-    for a `scene` that its recipe lacks.
+    for a `scene` that its recipe lacks. `plan`: the word's plan, if known.
 
     A recipe file denotes the artifacts that `iowbc plan` reports as cached. The section `eval` of that file, or of the
     recipe's last run for a name, sets how they are played.
@@ -211,7 +222,7 @@ def named_source(store: Store, console: Console, word: str, stage: str | None, s
         tell(console, training.text)
         generator = input_artifact(store, training.ingredients, "rg-fit", f"{training.stage} {training.key[:12]}")
         return Source(world_of(training.recipe, generator), training.checkpoint, training.key)
-    plan = planned(store, word)
+    plan = plan or planned(store, word)
     try:
         artifact = playable(store, word, stage, plan)
     except UsageError:

@@ -94,8 +94,8 @@ def mirror_half(
 
 
 class DistillationLoss(nn.Module):
-    """KL(teacher || student) and the auxiliary error of facts predicted from the latent, with all trained modules: the
-    network, its standard deviation and the auxiliary head."""
+    """KL(teacher || student) (paper eq. 7) and the auxiliary error of facts predicted from the latent, with all trained
+    modules: the network, its standard deviation and the auxiliary head."""
 
     teacher_log_std: Tensor
     std_place: Tensor

@@ -71,10 +71,11 @@ class DenseMlp(VectorPerceptron):
 
     def __init__(self, inputs: int, hidden: Sequence[int], outputs: int, activation: str) -> None:
         super().__init__()
-        self.layers = nn.Sequential()
+        layers = nn.Sequential()
         for before, units in itertools.pairwise([inputs, *hidden]):
-            self.layers.extend([nn.Linear(before, units), ACTIVATIONS[activation].module()])
+            layers.extend([nn.Linear(before, units), ACTIVATIONS[activation].module()])
         self.last = nn.Linear([inputs, *hidden][-1], outputs)
+        self.layers = layers  # after `last`: checkpoints of the optimiser count parameters in this order
 
     def hidden(self, prepared: Tensor) -> Hidden:
         return (self.layers(self.looked_at(prepared)),)

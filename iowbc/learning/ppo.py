@@ -35,7 +35,7 @@ from iowbc.rollouts.rollout_policies import ExploringPolicy
 from iowbc.rollouts.trajectories import Trajectories
 
 FIGURES = ("policy_loss", "value_loss", "imitation", "kl", "approx_kl", "clip_share")
-"""Means over all minibatches; over those of the last epoch for the two divergences."""
+"""Means over all minibatches; over those of the last epoch for `kl` and `approx_kl`."""
 
 
 Experts = Sequence[tuple[TeacherNetwork, Indices]]
@@ -152,10 +152,11 @@ class Learner:
         columns["action"].copy_(self._tensor(found.action))
         self.in_parallel(self._judge, samples.flat)
         columns["neighbours"].copy_(neighbours(columns["mean"], found.ended))
-        newest = self._tensor(self.policy.normalizer.newest(found.observation[:-1]))
-        with torch.inference_mode():
-            for expert, which in self.experts:
-                columns["imitated"][:, which] = expert(newest[:, which])
+        if self.experts:
+            newest = self._tensor(self.policy.normalizer.newest(found.observation[:-1]))
+            with torch.inference_mode():
+                for expert, which in self.experts:
+                    columns["imitated"][:, which] = expert(newest[:, which])
         steps = zip(found.reward, found.ended, strict=True)
         rewards = np.stack([self.normalization.reward(reward, ended) for reward, ended in steps])
         behind = np.concatenate([found.observation[-1], found.cut_observation])
@@ -212,6 +213,8 @@ class Learner:
         means = dict(zip(FIGURES, every.mean((0, 1)).tolist(), strict=True))
         last = dict(zip(FIGURES, every[-1].mean(0).tolist(), strict=True))
         values = means | {"kl": last["kl"], "approx_kl": last["approx_kl"], "explained_variance": self.explained}
+        if not self.experts:
+            del values["imitation"]
         values |= {"std": float(torch.exp(self.policy.log_std.detach()).mean()), "learning_rate": rate}
         if self._policy_learns:
             self.learning_rate = adapted(rate, last["kl"], settings, self.caution)

@@ -45,10 +45,10 @@ def load_network(folder: Path, names: Sequence[str] = NAMES) -> tuple[Network, d
 def require_layout(folder: Path, about: Mapping[str, Any], layout: Mapping[str, Any]) -> None:
     """Raises StageFailed if a network of `load_network` was trained on other parts than it would receive. `layout`: the
     parts of s_t and of s_priv, as `FullLayout` describes them; a student receives the first of s_t."""
-    kinds = ("observation",) if about["kind"] == "student" else ("observation", "privileged")
-    for kind in kinds:
+    student = about["kind"] == "student"
+    for kind in ("observation",) if student else ("observation", "privileged"):
         own, given = ([(part["name"], part["size"]) for part in parts[kind]] for parts in (about["layout"], layout))
-        if own != (given[: len(own)] if about["kind"] == "student" else given):
+        if own != (given := given[: len(own)] if student else given):
             differ = ", ".join(f"{name} ({size})" for name, size in sorted(set(own) ^ set(given))) or "their order"
             raise StageFailed(
                 f"{folder}: this policy was trained on another {kind}; what differs: {differ}. Use the code and the "
@@ -57,9 +57,11 @@ def require_layout(folder: Path, about: Mapping[str, Any], layout: Mapping[str, 
 
 
 def load_teacher(folder: Path, name: str = "teacher") -> tuple[TeacherNetwork, dict[str, Any]]:
-    """The network of a kind of teacher in a stage's artifact, and the JSON."""
+    """The network of a kind of teacher in a stage's artifact, and the JSON. Raises StageFailed for a student, which
+    PPO leaves with `teacher.history`."""
     network, about = load_network(folder, (name,))
-    assert isinstance(network, TeacherNetwork)
+    if not isinstance(network, TeacherNetwork):
+        raise StageFailed(f"{folder}: its policy acts on a history; name a teacher with privileged information")
     return network, about
 
 

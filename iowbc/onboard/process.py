@@ -6,16 +6,19 @@ import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from iowbc.onboard import messages
 from iowbc.onboard.checks import BusSnapshot
-from iowbc.onboard.dds import DdsBus
 from iowbc.onboard.log import LogWriter
 from iowbc.onboard.machine import FREQUENCY, CycleInputs, Machine, State
 from iowbc.onboard.messages import Record
 from iowbc.onboard.operators import Operator
+
+if TYPE_CHECKING:
+    from iowbc.onboard.dds import DdsBus
 
 PERIOD = 1.0 / FREQUENCY
 PATIENCE = 1.0
@@ -38,7 +41,7 @@ class MonotonicClock:
         self.late = 0.0
         """Delay of the last cycle's start [s]."""
 
-    def turn(self, bus: DdsBus) -> tuple[float, tuple[Record, ...]]:
+    def turn(self, bus: "DdsBus") -> tuple[float, tuple[Record, ...]]:
         """Waits for the next cycle; returns its time [s] and the states that have arrived."""
         self._due += PERIOD
         now = time.monotonic()
@@ -58,7 +61,7 @@ class LockStep:
     def __init__(self) -> None:
         self._now = 0.0
 
-    def turn(self, bus: DdsBus) -> tuple[float, tuple[Record, ...]]:
+    def turn(self, bus: "DdsBus") -> tuple[float, tuple[Record, ...]]:
         arrived = bus.wait(messages.LOW_STATE, PATIENCE)
         states = tuple(bus.take(messages.LOW_STATE))
         self._now = 1e-3 * float(states[-1]["tick"]) if arrived and states else self._now + PATIENCE
@@ -88,7 +91,7 @@ class Times:
         return "; ".join([f"{len(self.late)} turns", *parts])
 
 
-def listen(bus: DdsBus, seconds: float) -> BusSnapshot:
+def listen(bus: "DdsBus", seconds: float) -> BusSnapshot:
     """Receives messages for some time [s] from the first state on."""
     states: list[Record] = []
     battery: Record | None = None
@@ -119,7 +122,7 @@ def enable_realtime() -> str:
 
 
 def drive(
-    bus: DdsBus,
+    bus: "DdsBus",
     machine: Machine,
     operator: Operator,
     clock: Clock,

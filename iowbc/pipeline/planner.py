@@ -126,8 +126,10 @@ class Planner:
             text = f"code changed since it was made: {', '.join(changed)}"
             if whole and not artifact.whole:
                 reasons.append(NOT_WHOLE)
-            if changed:
-                (reasons if self.options.on_code_change == "rerun" else notes).append(text)
+            elif changed and self.options.on_code_change == "rerun":
+                reasons.append(text)
+            if changed and self.options.on_code_change == "report":
+                notes.append(text)
             notes.extend(self._cosmetic_notes(stage, artifact))
         return replace(step, artifact=artifact, damage=damage, reasons=tuple(reasons), notes=tuple(notes))
 

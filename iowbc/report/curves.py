@@ -167,7 +167,10 @@ def _suites(folder: Path) -> dict[str, dict[str, tuple[Values, Values, Values, V
     Intervals of errors are clipped at 0; for a mean over one trial the ends are NaN.
     """
     file = folder / "tables" / "summary.csv"
-    rows = pd.read_csv(file, dtype=str, encoding_errors="replace") if file.is_file() else pd.DataFrame()
+    try:
+        rows = pd.read_csv(file, dtype=str, encoding_errors="replace", index_col=False)
+    except (FileNotFoundError, pd.errors.EmptyDataError, pd.errors.ParserError):
+        return {}
     if not {"suite", "case", "mass"} <= {*rows}:
         return {}
     rows = rows.assign(mass=_numbers(rows, "mass")).dropna(subset="mass").sort_values("mass", kind="stable")

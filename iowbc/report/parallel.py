@@ -112,7 +112,9 @@ def _numbers(name: str, values: Sequence[float], *, named: bool) -> AxisScale:
     scale = LogNorm(low, high) if logarithmic else Normalize(low, high)
 
     def height(value: JsonValue) -> float:
-        return float(scale(value)) if isinstance(value, (int, float)) and math.isfinite(value) else math.nan
+        if not (isinstance(value, (int, float)) and math.isfinite(value)):
+            return math.nan
+        return float(scale(value)) if low < high else 0.5
 
     marked = sorted(set(values))
     if not (named and len(marked) <= VALUES_NAMED):

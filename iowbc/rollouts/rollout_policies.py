@@ -90,11 +90,11 @@ class DaggerPolicy:
 
     @property
     def starts(self) -> Mask:
-        """See `ExploringPolicy`."""
+        """See `ExploringPolicy.starts`."""
         return self.past.starts
 
     def part(self, first: int, last: int) -> Self:
-        """See `ExploringPolicy`."""
+        """See `ExploringPolicy.part`."""
         own = slice(first, last)
         return replace(self, teacher_of=self.teacher_of[own], taught=self.taught[own], past=self.past.of(first, last))
 
@@ -103,7 +103,7 @@ class DaggerPolicy:
         return self.past.history()
 
     def act(self, step: int, rows: Array, starts: Mask) -> Decision:
-        """See `ExploringPolicy`. Records `own`, the student's action, and `answer`, the teacher's, (n, A) each."""
+        """See `ExploringPolicy.act`. Records `own`, the student's action, and `answer`, the teacher's, (n, A) each."""
         del step
         answer = self._answer(0, rows)
         for place in range(1, len(self.teachers)):

@@ -51,7 +51,8 @@ class Sensing:
         self._mounting, self._gyro_bias = np.tile(np.eye(3), (n, 1, 1)), np.zeros((n, 3))
         self._drift, self._drifted = np.zeros(n), np.zeros(n)
         self._deviation = np.zeros((n, self.noise_width))
-        self._nominal = np.repeat(_deviations(recipe), [*sizes.values()])
+        deviations = _deviations(recipe)
+        self._nominal = np.repeat([deviations[name] for name in sizes], [*sizes.values()])
         self.rows = np.zeros((n, self.noise_width))
         self._quaternion = self.rows[:, columns["object_quaternion"]]
         self.measured = Measured(**{name: self.rows[:, place] for name, place in columns.items()})
@@ -127,10 +128,16 @@ class Sensing:
         return own
 
 
-def _deviations(recipe: Recipe) -> tuple[float, ...]:
-    """Standard deviation of each quantity, in their order; a rotation by η changes a unit quaternion by η / 2."""
-    return (
-        *(recipe.joint_position, recipe.joint_velocity, recipe.angular_velocity, recipe.gravity, recipe.heading),
-        *(recipe.object_position, 0.5 * recipe.object_orientation),
-        *(recipe.object_velocity, recipe.object_angular_velocity),
-    )
+def _deviations(recipe: Recipe) -> dict[str, float]:
+    """Standard deviation of each quantity; a rotation by η changes a unit quaternion by η / 2."""
+    return {
+        "joint_position": recipe.joint_position,
+        "joint_velocity": recipe.joint_velocity,
+        "base_angular_velocity": recipe.angular_velocity,
+        "projected_gravity": recipe.gravity,
+        "heading": recipe.heading,
+        "object_position": recipe.object_position,
+        "object_quaternion": 0.5 * recipe.object_orientation,
+        "object_linear_velocity": recipe.object_velocity,
+        "object_angular_velocity": recipe.object_angular_velocity,
+    }

@@ -1,14 +1,15 @@
 """Snapshots of a simulation, one row per environment, independent of the distribution over processes.
 
 A simulation keeps arrays by world (the environments of one scene) and the values of delay lines by period. In a
-snapshot worlds are named after their scene (`scene/...`), and delay lines have a row per environment (`ring/...`).
+snapshot worlds are named after their scene (`scene/...`), and delay lines have a row per environment (`ring/...`,
+after their first implementation).
 """
 
 from collections.abc import Mapping, Sequence
 
 from iowbc.arrays import Array
 
-RINGS = ("sensing/robot/values", "sensing/object/values", "partner/line/values")
+DELAY_LINES = ("sensing/robot/values", "sensing/object/values", "partner/line/values")
 """Values of delay lines, (length, n, width)."""
 
 
@@ -16,7 +17,7 @@ def by_environment(arrays: Mapping[str, Array], scenes: Sequence[str]) -> dict[s
     """Arrays of a simulation, each with one row per environment; `scenes`: names of its worlds, in order."""
     rows: dict[str, Array] = {}
     for name, values in arrays.items():
-        if name in RINGS:
+        if name in DELAY_LINES:
             rows[f"ring/{name}"] = values.swapaxes(0, 1)
         elif name.startswith("world"):
             world, _, rest = name.partition("/")

@@ -8,11 +8,13 @@ import numpy as np
 
 from iowbc.arrays import Array, Indices, Keys
 from iowbc.control.command import nominal_command
+from iowbc.robot.description import load_robot
 from iowbc.rollouts.blocks import in_blocks
 from iowbc.rollouts.policies import History, HistoryPolicy
 from iowbc.task.batch import Batch
 from iowbc.task.episodes import Episode
 from iowbc.task.judge import Judgement
+from iowbc.task.layout import full_layout
 from iowbc.task.motion import Motion
 from iowbc.task.specification import Specification
 from iowbc.task.vector.setup import Setup
@@ -30,12 +32,15 @@ class Student:
     """Size of the part of s_t that the student observes."""
 
 
-def load_student(folder: Path) -> Student:
-    """The student in the artifact of `distill`. Raises StageFailed for another kind of policy."""
+def load_student(folder: Path, world: Specification | None = None) -> Student:
+    """The student in the artifact of `distill`. Raises StageFailed for another kind of policy, and for one that was
+    trained on other observations than those of the `world` in which it acts."""
     from iowbc.learning.as_numpy import student_policy
-    from iowbc.learning.storage import load_student_network
+    from iowbc.learning.storage import load_student_network, require_layout
 
     network, about = load_student_network(folder)
+    if world is not None:
+        require_layout(folder, about, full_layout(world.recipe, load_robot(world.robot)).describe())
     return Student(student_policy(network), int(about["architecture"]["history"]), network.observation)
 
 

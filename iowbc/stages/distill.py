@@ -40,7 +40,7 @@ def run(job: Job) -> None:
     from iowbc.control.action import action_mirror
     from iowbc.control.observation import observation_layout
     from iowbc.learning.computing import prepare_process
-    from iowbc.learning.storage import load_teacher, save_network
+    from iowbc.learning.storage import load_teacher, require_layout, save_network
     from iowbc.learning.student import Rows, StudentTraining
     from iowbc.robot.description import load_robot
     from iowbc.robot.mirror import side_by_side
@@ -59,6 +59,8 @@ def run(job: Job) -> None:
     try:
         environments.set_curriculum(about["curriculum"])
         layout = environments.layout
+        for folder, own_about in zip(folders, abouts, strict=True):
+            require_layout(folder, own_about, layout.describe())
         own = dict(zip(layout.extra.names, layout.extra.mirrors, strict=True))
         seen = observation_layout(robot, recipe.task.observation.observe_object and settings.observe_object)
         unseen = layout.state.parts[len(seen.parts) :]

@@ -32,7 +32,7 @@ def expert_inputs(path: str, experts: Mapping[str, str]) -> dict[str, ExternalIn
 
 
 def unmatched_experts(recipe: Recipe, path: str, experts: Mapping[str, str]) -> Iterator[tuple[str, str]]:
-    """Problems of a stage: scenes that are played without an expert, or that have one and are not played."""
+    """Problems of experts by scene: played scenes without one, unless there are none, and scenes not played."""
     played = [name for name, share in recipe.task.scenes if share > 0.0]
     for scene in (name for name in played if experts and name not in experts):
         yield path, f"the scene {scene} is played and has no expert; name one for each of {played}"

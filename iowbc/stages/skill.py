@@ -45,7 +45,7 @@ def run(job: Job) -> None:
     recipe, settings = job.recipe, job.recipe.skill.learning
     seed = recipe.seed if settings.seed is None else settings.seed
     world = Specification(recipe, job.robot, job.inputs.get("rg-fit")).deployed
-    student = load_student(job.inputs[policy_stage(recipe)])
+    student = load_student(job.inputs[policy_stage(recipe)], world)
     with closing(TransportGame(world, student, n=settings.games, workers=job.workers, seed=seed)) as game:
         training = SkillTraining(settings, game, seed)
         curves = train(job, training, settings.checkpoint_every, _note)

@@ -72,7 +72,7 @@ def run(job: Job) -> None:
     torch.set_num_threads(1)  # the result must not depend on the machine's cores
     recipe, skill = job.recipe, job.recipe.skill
     world = Specification(recipe, job.robot, job.inputs.get("rg-fit")).deployed
-    student = load_student(job.inputs[policy_stage(recipe)])
+    student = load_student(job.inputs[policy_stage(recipe)], world)
     human = load_teacher(job.inputs["skill"], "human")[0] if "skill" in job.inputs else None
     lower = {"": (world, student)}
     for label in skill.eval.controllers:

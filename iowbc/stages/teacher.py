@@ -133,7 +133,8 @@ def run(job: Job) -> None:
 
 
 def _loaded_experts(job: Job, environments: "VectorEnv") -> "Experts":
-    """The experts to imitate, each with the environments of its scenes. Raises StageFailed if one observes others."""
+    """The experts to imitate, each with the environments of its scenes. Raises StageFailed if one observes other
+    parts than they have."""
     import numpy as np
 
     from iowbc.learning.storage import load_teacher, require_layout

@@ -2,18 +2,21 @@
 
 import time
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 from iowbc.onboard import messages
-from iowbc.onboard.dds import DdsBus
 from iowbc.onboard.process import PATIENCE, PERIOD
 from iowbc.twin.robot import Twin
+
+if TYPE_CHECKING:
+    from iowbc.onboard.dds import DdsBus
 
 BATTERY_PERIODS = 250
 """Bus periods between two battery states."""
 
 
 def serve(
-    bus: DdsBus,
+    bus: "DdsBus",
     twin: Twin,
     going: Callable[[], bool],
     *,

@@ -81,8 +81,9 @@ def student(recipe: Recipe, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """An untrained student: enough to fall over with."""
     folder = tmp_path_factory.mktemp("student")
     torch.manual_seed(0)
+    layout = full_layout(recipe, load_robot(robot_folder("g1")))
     architecture = {
-        "observation": full_layout(recipe, load_robot(robot_folder("g1"))).state.size,
+        "observation": layout.state.size,
         "history": 25,
         "actions": 15,
         "frame_features": 4,
@@ -91,7 +92,7 @@ def student(recipe: Recipe, tmp_path_factory: pytest.TempPathFactory) -> Path:
         "activation": "elu",
         "clip": 10.0,
     }
-    save_network(StudentNetwork(**architecture), architecture, folder, "student", {})
+    save_network(StudentNetwork(**architecture), architecture, folder, "student", {"layout": layout.describe()})
     return folder
 
 
@@ -301,14 +302,15 @@ def test_the_teacher_can_be_evaluated_too(student: Path, tmp_path: Path) -> None
     }
     recipe = Recipe.model_validate(question)
     assert evaluate.STAGE.reads(recipe) == ("rg-fit", "teacher")
+    layout = full_layout(recipe, load_robot(robot_folder("g1")))
     architecture = {
-        "inputs": full_layout(recipe, load_robot(robot_folder("g1"))).size,
+        "inputs": layout.size,
         "actions": 15,
         "hidden": [8],
         "activation": "elu",
         "clip": 10.0,
     }
-    save_network(TeacherNetwork(**architecture), architecture, tmp_path, "teacher", {})
+    save_network(TeacherNetwork(**architecture), architecture, tmp_path, "teacher", {"layout": layout.describe()})
     finished = job(recipe, tmp_path, tmp_path / "job")
     evaluate.run(finished)
     assert pd.read_parquet(finished.out / "trials.parquet")["policy"].tolist() == ["teacher"] * 2

@@ -189,7 +189,7 @@ def test_a_changed_count_is_reckoned_from_the_stored_rate(workplace: Workplace) 
 def test_what_is_left_of_an_interrupted_stage_is_reckoned_from_its_own_rate(workplace: Workplace) -> None:
     workplace.run(until="rg-fit")
     key = workplace.plan()["teacher"].key
-    assert key is not None
+    assert key
     workspace = Workspace(workplace.store.runs, "teacher", key)
     workspace.begin("small", False, {})
     workspace.progress(25, 100, "")

@@ -196,7 +196,7 @@ def read_artifact(folder: Path, stage: str, key: str, *, published: bool = False
 
 
 def _has_digest(data: Mapping[str, Any], digest: str | None) -> bool:
-    """True for data as they were written, also by a newer version with more entries; False for damaged ones."""
+    """True for data as they were written, a manifest's also by a newer version with more entries; False for damaged."""
     try:
         return data_digest(data) == digest
     except ValueError:  # a damaged number may be NaN

@@ -169,11 +169,9 @@ class Delivery:
     def _describe(self, run: str, tags: Mapping[str, str], params: Mapping[str, str]) -> None:
         from mlflow.entities import Param, RunTag
 
-        self._client.log_batch(
-            run,
-            params=[Param(name, text[:MAXIMUM_TEXT]) for name, text in params.items()],
-            tags=[RunTag(name, text[:MAXIMUM_TEXT]) for name, text in tags.items()],
-        )
+        self._client.log_batch(run, tags=[RunTag(name, text[:MAXIMUM_TEXT]) for name, text in tags.items()])
+        if params:  # a refused one loses no tags
+            self._client.log_batch(run, params=[Param(name, text[:MAXIMUM_TEXT]) for name, text in params.items()])
 
     def _files(self, run: str, names: Sequence[str]) -> None:
         """Send files and folders below `runs`; for the embedded database copy them to MLflow's artifact folder."""
@@ -198,8 +196,8 @@ def open_experiment(runs: Runs, uri: str, name: str) -> "tuple[MlflowClient, str
     an SQLite store lie under `runs/`. One process at a time: MLflow does not protect the set-up of a database."""
     from mlflow.tracking import MlflowClient
 
-    client = MlflowClient(tracking_uri=uri)
     with named_lock(runs.tracking / "setup.lock"):
+        client = MlflowClient(tracking_uri=uri)
         if (found := client.get_experiment_by_name(name)) is not None:
             return client, str(found.experiment_id)
         location = runs.tracked_files.absolute().as_uri() if uri.startswith("sqlite:") else None
