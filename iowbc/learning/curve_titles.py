@@ -25,7 +25,6 @@ TITLES = {
     "check/E_alpha": "E_α in the check [rad]",
     "check/E_h": "E_h in the check [m]",
     "train/kl": "KL divergence of an update [nat]",
-    "train/imitation": "KL divergence from the expert [nat]",
     "train/approx_kl": "KL divergence of an update, sampled [nat]",
     "train/policy_loss": "loss of the policy",
     "train/value_loss": "loss of the value",

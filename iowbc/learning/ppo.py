@@ -18,12 +18,12 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.utils import set_random_seed
 from torch import Tensor
 
-from iowbc.arrays import Array, Indices
+from iowbc.arrays import Array
 from iowbc.learning.as_numpy import acting_policy
 from iowbc.learning.computing import ParallelBatch, reduced
 from iowbc.learning.gaussian import divergence, entropy, log_density
 from iowbc.learning.history_actor import student_architecture
-from iowbc.learning.networks import Mirrors, TeacherNetwork, mirrors_as_json
+from iowbc.learning.networks import Mirrors, mirrors_as_json
 from iowbc.learning.normalization import Normalization
 from iowbc.learning.policy import ActorCritic
 from iowbc.learning.rollout import Samples, neighbours
@@ -34,12 +34,8 @@ from iowbc.rollouts.blocks import block_size
 from iowbc.rollouts.rollout_policies import ExploringPolicy
 from iowbc.rollouts.trajectories import Trajectories
 
-FIGURES = ("policy_loss", "value_loss", "imitation", "kl", "approx_kl", "clip_share")
+FIGURES = ("policy_loss", "value_loss", "kl", "approx_kl", "clip_share")
 """Means over all minibatches; over those of the last epoch for `kl` and `approx_kl`."""
-
-
-Experts = Sequence[tuple[TeacherNetwork, Indices]]
-"""Teachers, each with the environments in which it is imitated."""
 
 
 class Learner:
@@ -57,10 +53,9 @@ class Learner:
         cores: int,
         value_only: Sequence[int] = (),
         device: str = "cpu",
-        experts: Experts = (),
     ) -> None:
         """`mirrors`: of observation and action; `cores`: for network updates; `value_only`: indices of observations
-        for the value network only; `device`: torch device of the networks; `experts`: to imitate."""
+        for the value network only; `device`: torch device of the networks."""
         set_random_seed(seed)
         env.seed(seed)
         self.settings, self.env, self.mirrors, self.device = teacher, env, mirrors, torch.device(device)
@@ -74,8 +69,7 @@ class Learner:
             **self._arguments,
         ).to(self.device)
         (inputs,), (actions,) = env.observation_space.shape, env.action_space.shape
-        self.experts = [(network.to(self.device), torch.from_numpy(which)) for network, which in experts]
-        self.samples = Samples(teacher.rollout, env.num_envs, inputs, actions, self.device, bool(experts))
+        self.samples = Samples(teacher.rollout, env.num_envs, inputs, actions, self.device)
         size, mirror = len(self.policy.normalizer.mean), None if teacher.symmetry == "none" else mirrors[0]
         self.normalization = Normalization(size, env.num_envs, teacher.gamma, mirror)
         self.observation: Array | None = None
@@ -152,11 +146,6 @@ class Learner:
         columns["action"].copy_(self._tensor(found.action))
         self.in_parallel(self._judge, samples.flat)
         columns["neighbours"].copy_(neighbours(columns["mean"], found.ended))
-        if self.experts:
-            newest = self._tensor(self.policy.normalizer.newest(found.observation[:-1]))
-            with torch.inference_mode():
-                for expert, which in self.experts:
-                    columns["imitated"][:, which] = expert(newest[:, which])
         steps = zip(found.reward, found.ended, strict=True)
         rewards = np.stack([self.normalization.reward(reward, ended) for reward, ended in steps])
         behind = np.concatenate([found.observation[-1], found.cut_observation])
@@ -213,8 +202,6 @@ class Learner:
         means = dict(zip(FIGURES, every.mean((0, 1)).tolist(), strict=True))
         last = dict(zip(FIGURES, every[-1].mean(0).tolist(), strict=True))
         values = means | {"kl": last["kl"], "approx_kl": last["approx_kl"], "explained_variance": self.explained}
-        if not self.experts:
-            del values["imitation"]
         values |= {"std": float(torch.exp(self.policy.log_std.detach()).mean()), "learning_rate": rate}
         if self._policy_learns:
             self.learning_rate = adapted(rate, last["kl"], settings, self.caution)
@@ -263,16 +250,11 @@ class Learner:
         if settings.smoothness:
             std = log_std.detach()  # smoothness must come from the mean, not from more noise
             loss = loss + settings.smoothness * divergence(samples["neighbours"], std, mean, std).mean()
-        imitation = mean.new_zeros(())
-        if settings.history is not None and self.experts:
-            std = log_std.detach()
-            imitation = divergence(samples["imitated"], std, mean, std).mean()
-            loss = loss + settings.history.imitation * imitation
         with torch.no_grad():
             kl = divergence(samples["mean"], before, mean, log_std).mean()
             sampled = (ratio - 1.0 - difference).mean()
             share = ((ratio - 1.0).abs() > settings.clip).float().mean()
-            figures = torch.stack([policy_loss, value_loss, imitation, kl, sampled, share])
+            figures = torch.stack([policy_loss, value_loss, kl, sampled, share])
         return loss, figures
 
 

@@ -16,20 +16,13 @@ class Samples:
     """Samples of T steps of n environments as rows, so that an epoch shuffles them with a single gather.
 
     `columns` are views of the rows by name: prepared observation, action, the policy's mean, mean of its neighbours in
-    time, log density and value before the update, advantage and value target, and where experts are imitated their
-    mean. Each rollout overwrites the previous one.
+    time, log density and value before the update, advantage and value target. Each rollout overwrites the previous one.
     """
 
     def __init__(
-        self,
-        steps: int,
-        environments: int,
-        observation: int,
-        actions: int,
-        device: torch.device | None = None,
-        imitates: bool = False,
+        self, steps: int, environments: int, observation: int, actions: int, device: torch.device | None = None
     ) -> None:
-        acting = dict.fromkeys(("action", "mean", "neighbours", *(("imitated",) if imitates else ())), actions)
+        acting = dict.fromkeys(("action", "mean", "neighbours"), actions)
         sizes = {"observation": observation, **acting, **dict.fromkeys(SINGLE, 1)}
         ends = np.cumsum(list(sizes.values())).tolist()
         self.places = {name: slice(end - size, end) for (name, size), end in zip(sizes.items(), ends, strict=True)}

@@ -14,7 +14,7 @@ from iowbc.learning.best import Best, PolicyAverage
 from iowbc.learning.checkpoint import Arrays, prefixed, under
 from iowbc.learning.environments import Environments
 from iowbc.learning.networks import Mirrors
-from iowbc.learning.ppo import Experts, Learner
+from iowbc.learning.ppo import Learner
 from iowbc.learning.storage import Network
 from iowbc.learning.trained import load_policy_weights, trained_network
 from iowbc.recipe.teacher import Teacher
@@ -41,18 +41,16 @@ class TeacherTraining:
         cores: int = 1,
         value_only: Sequence[int] = (),
         device: str = "cpu",
-        experts: Experts = (),
         score: Score | None = None,
         say: Callable[[str], None] = print,
     ) -> None:
         """`mirrors`: of observation and action; `cores`: for network updates, while the environments are idle;
         `value_only`: indices of observations for the value network only; `device`: torch device of the networks;
-        `experts`: to imitate; `score`: fixed evaluation that selects the best policy; `say`: receives a message at each
-        rollback."""
+        `score`: fixed evaluation that selects the best policy; `say`: receives a message at each rollback."""
         self.settings, self.environments, self.mirrors = settings, environments, mirrors
         self.score = score if settings.check.every is not None else None
         self.say = say
-        self.model = Learner(settings, environments, seed, mirrors, cores, value_only, device, experts)
+        self.model = Learner(settings, environments, seed, mirrors, cores, value_only, device)
         self.average: PolicyAverage | None = None
         if settings.average_half_life is not None:
             updates = settings.average_half_life / (settings.environments * settings.rollout)

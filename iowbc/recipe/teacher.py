@@ -84,13 +84,6 @@ class HistoryNetwork(Encoder):
     """Distilled student to fine-tune with PPO, named as in `teacher.start`. Distillation imitates the teacher even if
     the history lacks the teacher's information; PPO optimizes the reward there. The student must have this network
     (`estimate` included)."""
-    experts: dict[str, ArtifactName] = Field(default_factory=dict, json_schema_extra=COSMETIC)
-    """Teachers by scene, named as in `distill.experts`, that the policy goes on imitating while PPO trains it
-    (kickstarting, Schmitt et al. 2018). PPO alone gives up skills that the reward hardly pays for, such as the pace of
-    a heavy crate. The key depends on their content, not on these names."""
-    imitation: float = Field(default=0.1, ge=0, json_schema_extra=LATER)
-    """Weight of the KL divergence from the expert's action in the loss, with `experts`. At a divergence of 4, which a
-    distilled student keeps, 0.1 gives a gradient about as large as the reward's."""
 
 
 class Restart(Section):

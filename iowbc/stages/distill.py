@@ -2,9 +2,9 @@
 
 from collections.abc import Iterator, Mapping
 
-from iowbc.pipeline.stage import Job, Stage
+from iowbc.pipeline.stage import ExternalInput, Job, Stage
 from iowbc.recipe.recipe import Recipe
-from iowbc.stages.inputs import expert_inputs, generator_stage, not_privileged, unmatched_experts
+from iowbc.stages.inputs import generator_stage, not_privileged
 from iowbc.stages.training import rolls_elsewhere, train
 
 PANELS = (
@@ -27,7 +27,12 @@ FACTS = ("object_mass", "base_linear_velocity")
 def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
     """Problems: a teacher that is a student, names not in s_priv, or scenes and experts that do not match."""
     yield from not_privileged(recipe, "distill.withheld", recipe.distill.withheld)
-    yield from unmatched_experts(recipe, "distill.experts", recipe.distill.experts)
+    if experts := recipe.distill.experts:
+        played = [name for name, share in recipe.task.scenes if share > 0.0]
+        for scene in (name for name in played if name not in experts):
+            yield "distill.experts", f"the scene {scene} is played and has no expert; name one for each of {played}"
+        for scene in (name for name in experts if name not in played):
+            yield f"distill.experts.{scene}", f"no scene {scene} is played; valid: {', '.join(played)}"
     if recipe.teacher.history is not None:
         text = "with teacher.history PPO trains the student's network itself, and nothing is to be distilled: leave "
         yield "stages", f"{text}`distill` out, or set teacher.history to null"
@@ -106,7 +111,10 @@ STAGE = Stage(
     version=4,
     slice=("seed", "rg.height", "simulation", "task", "teacher.symmetry", "teacher.normalization_clip", "distill"),
     reads=lambda recipe: (*generator_stage(recipe), *(() if recipe.distill.experts else ("teacher",))),
-    borrows=lambda recipe: expert_inputs("distill.experts", recipe.distill.experts),
+    borrows=lambda recipe: {
+        f"expert/{scene}": ExternalInput(f"distill.experts.{scene}", named, "teacher")
+        for scene, named in recipe.distill.experts.items()
+    },
     run=run,
     problems=problems,
     results=("student.safetensors", "student.json"),

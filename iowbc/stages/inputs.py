@@ -1,8 +1,7 @@
 """Inputs of the stages behind the reference generator."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
-from iowbc.pipeline.stage import ExternalInput
 from iowbc.recipe.recipe import Recipe
 
 
@@ -24,20 +23,6 @@ def without_student(recipe: Recipe, stage: str) -> Iterator[tuple[str, str]]:
     """The problem of a stage that needs a student where no stage of the recipe trains one."""
     if not leaves_student(recipe):
         yield "stages", f"{stage} needs a student, and none of the stages trains one; add `distill`, or leave it out"
-
-
-def expert_inputs(path: str, experts: Mapping[str, str]) -> dict[str, ExternalInput]:
-    """The teachers that a recipe names by scene at a dotted path."""
-    return {f"expert/{scene}": ExternalInput(f"{path}.{scene}", named, "teacher") for scene, named in experts.items()}
-
-
-def unmatched_experts(recipe: Recipe, path: str, experts: Mapping[str, str]) -> Iterator[tuple[str, str]]:
-    """Problems of experts by scene: played scenes without one, unless there are none, and scenes not played."""
-    played = [name for name, share in recipe.task.scenes if share > 0.0]
-    for scene in (name for name in played if experts and name not in experts):
-        yield path, f"the scene {scene} is played and has no expert; name one for each of {played}"
-    for scene in (name for name in experts if name not in played):
-        yield f"{path}.{scene}", f"no scene {scene} is played; valid: {', '.join(played)}"
 
 
 def not_privileged(recipe: Recipe, path: str, names: Sequence[str]) -> Iterator[tuple[str, str]]:

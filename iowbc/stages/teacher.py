@@ -10,18 +10,16 @@ from iowbc.errors import StageFailed
 from iowbc.learning.curves import TABLE
 from iowbc.pipeline.stage import START, ExternalInput, Job, Stage
 from iowbc.recipe.recipe import Recipe
-from iowbc.stages.inputs import expert_inputs, generator_stage, not_privileged, unmatched_experts
+from iowbc.stages.inputs import generator_stage, not_privileged
 from iowbc.stages.training import STATE, leave_extendable, rolls_elsewhere, train
 
 if TYPE_CHECKING:
     from iowbc.evaluation.films import TrainingFilms
     from iowbc.evaluation.trials.quick import QuickEvaluation
-    from iowbc.learning.ppo import Experts
     from iowbc.learning.teacher import TeacherTraining
     from iowbc.task.specification import Specification
     from iowbc.task.vector.vector_env import VectorEnv
 
-EXPERTS = "teacher.history.experts"
 VIDEOS = "videos"
 """Folder of the films made while training."""
 PANELS = (
@@ -45,9 +43,8 @@ PANELS = (
 
 
 def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
-    """Problems: names that are not in s_priv, or that are taken twice, or scenes and experts that do not match."""
+    """Problems: names that are not in s_priv, or that are taken twice."""
     yield from not_privileged(recipe, "teacher.value_only", recipe.teacher.value_only)
-    yield from unmatched_experts(recipe, EXPERTS, _experts(recipe))
     if recipe.task.observation.own:
         from iowbc.task.own_parts import taken_names
 
@@ -55,15 +52,10 @@ def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
 
 
 def borrows(recipe: Recipe) -> Mapping[str, ExternalInput]:
-    """The teacher or student that training begins from, and the experts that it imitates."""
+    """The teacher or student that training begins from."""
     path, named = recipe.teacher.beginning
     stage = "teacher" if path == "teacher.start" else "distill"
-    begins = {} if named is None else {START: ExternalInput(path, named, stage)}
-    return begins | expert_inputs(EXPERTS, _experts(recipe))
-
-
-def _experts(recipe: Recipe) -> dict[str, str]:
-    return {} if recipe.teacher.history is None else recipe.teacher.history.experts
+    return {} if named is None else {START: ExternalInput(path, named, stage)}
 
 
 def run(job: Job) -> None:
@@ -108,7 +100,6 @@ def run(job: Job) -> None:
             cores=available_cores(),
             value_only=environments.layout.privileged_places(settings.value_only).tolist(),
             device=recipe.execution.device,
-            experts=_loaded_experts(job, environments),
             score=score,
             say=job.report.say,
         )
@@ -130,29 +121,6 @@ def run(job: Job) -> None:
     figures = curves.write_artifact(job.out, f"{recipe.name}: teacher", PANELS, terms)
     kept = {"best_score": training.best.score} if settings.check.every is not None else {}
     job.summarize(kept | figures)
-
-
-def _loaded_experts(job: Job, environments: "VectorEnv") -> "Experts":
-    """The experts to imitate, each with the environments of its scenes. Raises StageFailed if one observes other
-    parts than they have."""
-    import numpy as np
-
-    from iowbc.learning.storage import load_teacher, require_layout
-    from iowbc.task.vector.setup import scene_of
-
-    experts = _experts(job.recipe)
-    if not experts:
-        return ()
-    scenes = np.array(scene_of(environments.num_envs, job.recipe.task.scenes))
-    folders: dict[Path, list[str]] = {}
-    for scene in experts:
-        folders.setdefault(job.inputs[f"expert/{scene}"], []).append(scene)
-    found = []
-    for folder, own in folders.items():
-        network, about = load_teacher(folder)
-        require_layout(folder, about, environments.layout.describe())
-        found.append((network, np.flatnonzero(np.isin(scenes, own))))
-    return found
 
 
 def _begin(training: "TeacherTraining", environments: "VectorEnv", start: Path) -> None:

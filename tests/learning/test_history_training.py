@@ -13,7 +13,7 @@ from iowbc.learning.acting import StudentPolicy, policy_of, unfinished_policy
 from iowbc.learning.as_numpy import student_policy
 from iowbc.learning.checkpoint import save_checkpoint
 from iowbc.learning.environments import HistoryEnvironments
-from iowbc.learning.networks import StudentNetwork, TeacherNetwork
+from iowbc.learning.networks import StudentNetwork
 from iowbc.learning.symmetry import mirror_tensor
 from iowbc.learning.teacher import TeacherTraining
 from iowbc.recipe.teacher import HistoryNetwork, Teacher
@@ -125,33 +125,3 @@ def test_mirror_images_of_samples_and_an_odd_latent_are_refused() -> None:
         Teacher(symmetry="augment", history=NETWORK)
     with pytest.raises(ValueError, match="7 is odd"):
         Teacher(history=HistoryNetwork(latent=7))
-
-
-def imitating(*experts: tuple[TeacherNetwork, Any]) -> TeacherTraining:
-    environments = HistoryEnvironments(PointMasses(), SEEN, LENGTH)
-    settings = SETTINGS.model_copy(update={"history": NETWORK.model_copy(update={"imitation": 10.0})})
-    return TeacherTraining(settings, environments, MIRRORS, seed=3, experts=experts)
-
-
-def expert() -> TeacherNetwork:
-    return TeacherNetwork(SEEN + 1, 1, (8,), "elu", 10.0).requires_grad_(False)
-
-
-def test_each_expert_is_imitated_in_its_own_environments() -> None:
-    experts = [(expert(), np.arange(4)), (expert(), np.arange(4, 8))]
-    some = imitating(*experts)
-    some.update()
-    columns, normalizer = some.model.samples.columns, some.model.policy.normalizer
-    rows = columns["observation"][..., -(SEEN + 1) :] * normalizer.std + normalizer.mean
-    for network, which in experts:
-        torch.testing.assert_close(columns["imitated"][:, which], network(rows[:, which]), rtol=1e-4, atol=1e-4)
-
-
-def test_the_policy_comes_closer_to_the_expert_that_it_imitates() -> None:
-    some = imitating((expert(), np.arange(8)))
-    errors = []
-    while some.steps < some.planned:
-        some.update()
-        columns = some.model.samples.columns
-        errors.append(float((columns["imitated"] - columns["mean"]).square().mean()))
-    assert errors[-1] < 0.2 * errors[0], (errors[0], errors[-1])

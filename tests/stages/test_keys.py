@@ -50,7 +50,6 @@ COSMETIC = {
     "simulation.physics.divergences_kept",
     "teacher.check.films",
     "teacher.start",
-    "teacher.history.experts",
     "teacher.history.student",
     "distill.experts",
     "teacher.checkpoint_every",

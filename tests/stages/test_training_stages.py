@@ -364,21 +364,3 @@ def test_a_scene_without_an_expert_and_an_expert_without_a_scene_are_refused() -
         "distill.experts": "the scene lift is played and has no expert; name one for each of ['free', 'lift']",
         "distill.experts.push": "no scene push is played; valid: free, lift",
     }
-
-
-def test_ppo_imitates_the_expert_of_each_scene(trained: Path, tmp_path: Path) -> None:
-    history = {"length": 5, "frame_features": 4, "latent": 4, "experts": {"free": "a.yaml", "lift": "b.yaml"}}
-    recipe = small_recipe(history=history)
-    assert {one.named for one in teacher.STAGE.borrows(recipe).values()} == {"a.yaml", "b.yaml"}
-    assert not [*teacher.STAGE.problems(recipe)]
-    folder = trained / "teacher" / "out"
-    reads = {"expert/free": folder, "expert/lift": folder}
-    teacher.STAGE.run(job := make_job(tmp_path / "one", recipe, inputs=reads, workers=0))
-    assert all(row["train/imitation"] > 0.0 for row in rows(job.work))
-    assert not any("train/imitation" in row for row in rows(trained / "teacher" / "work"))
-
-    student = dict.fromkeys(reads, job.out)
-    with pytest.raises(StageFailed, match="acts on a history"):
-        teacher.STAGE.run(make_job(tmp_path / "other", recipe, inputs=student, workers=0))
-    without = small_recipe(history=history | {"experts": {"free": "a.yaml"}})
-    assert [path for path, _ in teacher.STAGE.problems(without)] == ["teacher.history.experts"]
