@@ -23,6 +23,11 @@ def acting_policy(policy: ActorCritic) -> RowPolicy | HistoryPolicy:
     return RowPolicy(_normal(normalizer), layers_of(actor))
 
 
+def numpy_policy(network: TeacherNetwork | StudentNetwork) -> RowPolicy | HistoryPolicy:
+    """NumPy policy of a teacher or a student."""
+    return teacher_policy(network) if isinstance(network, TeacherNetwork) else student_policy(network)
+
+
 def teacher_policy(network: TeacherNetwork) -> RowPolicy:
     """NumPy policy of a teacher."""
     return RowPolicy(_normal(network.normalizer), layers_of(network.body))

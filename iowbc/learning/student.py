@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from iowbc.learning import checkpoint
-from iowbc.learning.as_numpy import student_policy, teacher_policy
+from iowbc.learning.as_numpy import numpy_policy, student_policy
 from iowbc.learning.distillation import DistillationLoss, ReplayBuffer, Symmetry, mirror_half, spread
 from iowbc.learning.environments import Environments
 from iowbc.learning.networks import StudentNetwork, TeacherNetwork, mirror_as_json, mirrors_as_json
+from iowbc.learning.storage import Network
 from iowbc.recipe.distillation import Distillation
 from iowbc.robot.mirror import MirrorMap, side_by_side
 from iowbc.rollouts.blocks import block_size
@@ -47,7 +48,7 @@ class StudentTraining:
         self,
         settings: Distillation,
         environments: Environments,
-        teachers: Sequence[TeacherNetwork],
+        teachers: Sequence[Network],
         teacher_of: NDArray[np.int64],
         architecture: Mapping[str, Any],
         rows: Rows,
@@ -56,10 +57,10 @@ class StudentTraining:
     ) -> None:
         """`teacher_of`: index of each environment's teacher, (n,); `architecture`: arguments that rebuild the first
         teacher; `symmetry`: of the teachers. The student takes over the first teacher's normalisation and, if
-        `settings.start` is "teacher", its body."""
+        `settings.start` is "teacher", its body, or the whole network of a teacher that is a student itself."""
         torch.manual_seed(seed)
         self.settings, self.environments, self.rows, self.symmetry = settings, environments, rows, symmetry
-        self.teachers, self.teacher_of = tuple(map(teacher_policy, teachers)), teacher_of
+        self.teachers, self.teacher_of = tuple(map(numpy_policy, teachers)), teacher_of
         teacher = teachers[0]
         size, actions = rows.observation.stop, environments.action_space.shape[0]
         inherits = settings.start == "teacher"
@@ -76,15 +77,21 @@ class StudentTraining:
             "mirrors": mirrors_as_json((rows.observation_mirror, rows.action_mirror), symmetry),
             "privileged": mirror_as_json(rows.privileged_mirror) if inherits else None,
         }
+        if inherits and isinstance(teacher, StudentNetwork):
+            self.architecture = dict(architecture)
         self.network = StudentNetwork(**self.architecture)
-        if inherits:
+        if inherits and isinstance(teacher, StudentNetwork):
+            self.network.load_state_dict(teacher.state_dict())
+        elif inherits:
             self.network.body.load_state_dict(teacher.body.state_dict())
         self.network.normalizer.mean.copy_(teacher.normalizer.mean[rows.observation])
         self.network.normalizer.std.copy_(teacher.normalizer.std[rows.observation])
         floor = float(np.log(settings.std_floor))
         log_std = torch.stack([one.log_std for one in teachers]).mean(0).clamp(min=floor)
         self.loss = DistillationLoss(settings, log_std, self.network, rows.facts_mirror, rows.action_mirror, symmetry)
-        self.facts_mean, self.facts_std = teacher.normalizer.mean[rows.facts], teacher.normalizer.std[rows.facts]
+        knowing = next((one.normalizer for one in teachers if isinstance(one, TeacherNetwork)), None)
+        self.facts_mean = torch.zeros(len(rows.facts)) if knowing is None else knowing.mean[rows.facts]
+        self.facts_std = torch.ones(len(rows.facts)) if knowing is None else knowing.std[rows.facts]
         self.optimizer = torch.optim.Adam(self.loss.parameters(), settings.learning_rate)
         self.random = np.random.default_rng(seed)
         self.experience = ReplayBuffer(

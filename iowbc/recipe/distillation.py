@@ -21,7 +21,9 @@ class Distillation(Encoder):
     """Length of the observation history H_t (paper Table I)."""
     experts: dict[str, ArtifactName] = Field(default_factory=dict, json_schema_extra=COSMETIC)
     """Teachers by scene: a recipe whose teacher the student imitates in that scene, or a key as in `teacher.start`.
-    Empty: this recipe's own teacher in all scenes. The key depends on the teachers' content, not on these names."""
+    Empty: this recipe's own teacher in all scenes. One that PPO trained on its history (`teacher.history`) can be
+    imitated without error; if it is the first, the student starts as its copy. Use `auxiliary: 0` if all are such, as
+    they do not know the scale of the facts. The key depends on the teachers' content, not on these names."""
     start: Literal["teacher", "anew"] = "teacher"
     """Initial weights of the layers behind the encoder. `teacher`: the teacher's own layers; their input s_priv is
     replaced by a linear estimate from the latent, which is initially the training mean, so that training begins with

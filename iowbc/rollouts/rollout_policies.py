@@ -73,7 +73,8 @@ class DaggerPolicy:
     """A student, and teachers that label every step with their own action and act in some of the environments."""
 
     student: HistoryPolicy
-    teachers: tuple[RowPolicy, ...]
+    teachers: tuple[RowPolicy | HistoryPolicy, ...]
+    """Those of a history receive the student's."""
     observation: slice
     """Place of s_t in a row."""
     privileged: slice
@@ -105,17 +106,20 @@ class DaggerPolicy:
     def act(self, step: int, rows: Array, starts: Mask) -> Decision:
         """See `ExploringPolicy.act`. Records `own`, the student's action, and `answer`, the teacher's, (n, A) each."""
         del step
-        answer = self._answer(0, rows)
+        history = self._history.push(rows[:, self.observation], starts)
+        answer = self._answer(0, rows, history)
         for place in range(1, len(self.teachers)):
             own = self.teacher_of == place
             if own.any():
-                answer[own] = self._answer(place, rows)[own]
-        own = in_blocks(self.student, self.block, self._history.push(rows[:, self.observation], starts))
+                answer[own] = self._answer(place, rows, history)[own]
+        own = in_blocks(self.student, self.block, history)
         return np.where(self.taught[:, None], answer, own), {"own": own, "answer": answer}
 
-    def _answer(self, place: int, rows: Array) -> Array:
+    def _answer(self, place: int, rows: Array, history: Array) -> Array:
         """Actions of one teacher in every environment, (n, A), computed in blocks."""
         teacher, seen = self.teachers[place], rows.copy()
+        if isinstance(teacher, HistoryPolicy):
+            return in_blocks(teacher, self.block, history)
         seen[:, self.masked] = teacher.normal.mean[self.masked]
         seen = np.concatenate([seen[:, self.observation], seen[:, self.privileged]], axis=1)
         return in_blocks(teacher, self.block, seen)

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 
+from iowbc.errors import StageFailed
 from iowbc.pipeline.stage import ExternalInput, Job, Stage
 from iowbc.recipe.recipe import Recipe
 from iowbc.stages.inputs import generator_stage, not_privileged
@@ -45,7 +46,7 @@ def run(job: Job) -> None:
     from iowbc.control.action import action_mirror
     from iowbc.control.observation import observation_layout
     from iowbc.learning.computing import prepare_process
-    from iowbc.learning.storage import load_teacher, require_layout, save_network
+    from iowbc.learning.storage import load_network, require_layout, save_network
     from iowbc.learning.student import Rows, StudentTraining
     from iowbc.robot.description import load_robot
     from iowbc.robot.mirror import side_by_side
@@ -58,7 +59,7 @@ def run(job: Job) -> None:
     scenes = scene_of(settings.environments, recipe.task.scenes)
     folder_of = {scene: job.inputs[f"expert/{scene}" if settings.experts else "teacher"] for scene in scenes}
     folders = list(dict.fromkeys(folder_of.values()))
-    teachers, abouts = zip(*map(load_teacher, folders), strict=True)
+    teachers, abouts = zip(*(load_network(folder, ("teacher",)) for folder in folders), strict=True)
     about = abouts[0]
     environments = training_environments(job, count=settings.environments, seed=seed + 1)
     try:
@@ -66,6 +67,10 @@ def run(job: Job) -> None:
         layout = environments.layout
         for folder, own_about in zip(folders, abouts, strict=True):
             require_layout(folder, own_about, layout.describe())
+            sizes = own_about["architecture"] if own_about["kind"] == "student" else {}
+            for name in ("history", "frame_features", "latent"):
+                if sizes.get(name, wanted := getattr(settings, name)) != wanted:
+                    raise StageFailed(f"{folder}: distill.{name} is {wanted}, that student's {sizes[name]}")
         own = dict(zip(layout.extra.names, layout.extra.mirrors, strict=True))
         seen = observation_layout(robot, recipe.task.observation.observe_object and settings.observe_object)
         unseen = layout.state.parts[len(seen.parts) :]

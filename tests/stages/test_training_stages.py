@@ -364,3 +364,17 @@ def test_a_scene_without_an_expert_and_an_expert_without_a_scene_are_refused() -
         "distill.experts": "the scene lift is played and has no expert; name one for each of ['free', 'lift']",
         "distill.experts.push": "no scene push is played; valid: free, lift",
     }
+
+
+def test_the_student_of_a_student_begins_as_its_copy(tmp_path: Path) -> None:
+    history = {"length": 25, "estimate": True}
+    teacher.STAGE.run(made := make_job(tmp_path / "ppo", small_recipe(history=history), workers=0))
+    recipe = changed(small_recipe(), "distill.experts", {"free": "a.yaml", "lift": "a.yaml"})
+    inputs = {"expert/free": made.out, "expert/lift": made.out}
+    distill.STAGE.run(job := make_job(tmp_path / "copy", recipe, inputs=inputs, workers=0))
+    first, *_ = rows(job.work)
+    assert first["action_rmse"] < 1e-5
+    assert first["kl"] < 1.0, "of the standard deviations alone"
+    shorter = changed(recipe, "distill.history", 10)
+    with pytest.raises(StageFailed, match=r"distill\.history is 10, that student's 25"):
+        distill.STAGE.run(make_job(tmp_path / "shorter", shorter, inputs=inputs, workers=0))
