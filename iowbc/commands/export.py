@@ -34,11 +34,13 @@ def export(
     store = Store(Runs(runs))
     exported = Path(word)
     if not os.path.isfile(exported / CONTRACT):
-        if (made := named(store, word).usable.get("export")) is None:
+        made = named(store, word).usable
+        if "export" not in made:
             raise UsageError(
-                f"{word}: no exported controller; run a recipe that ends with `export`, or give the folder that it made"
+                f"{word}: no exported controller; finished: {', '.join(made) or 'none'}; "
+                "run a recipe that ends with `export`, or give the folder that it made"
             )
-        exported = made.folder
+        exported = made["export"].folder
     if folder.is_dir() and any(folder.iterdir()) and not (folder / "scenes.json").is_file():
         raise UsageError(f"--web {folder}: holds other files; give an empty folder, or one that this command has made")
     require_writable(folder, "--web")

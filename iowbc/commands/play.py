@@ -147,7 +147,7 @@ def planned(store: Store, word: str) -> Planned:
     return Planned(loaded.recipe, {step.stage.name: step.artifact for step in steps if step.cached and step.artifact})
 
 
-def skill_to_play(store: Store, word: str, stage: str | None, plan: Planned) -> Artifact | None:
+def skill_to_play(store: Store, word: str, stage: str | None, plan: Planned = Planned()) -> Artifact | None:
     """The skill that a word and `--stage` name; None where they name no skill, or another stage."""
     if stage not in (None, SKILL) or Path(word).is_dir():
         return None

@@ -13,7 +13,7 @@ from iowbc.web.page import SOURCE, npm_parts, parts_folder
 
 
 def test_a_page_is_of_an_exported_controller(folder: Path, tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match=r"first/teacher: no policy of stage export to play; .*; finished: teacher$"):
+    with pytest.raises(UsageError, match=r"first/teacher: no exported controller; finished: teacher; run a recipe"):
         export("first/teacher", tmp_path / "page", folder / "runs")
 
 

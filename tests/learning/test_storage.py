@@ -44,7 +44,7 @@ def test_a_student_is_refused_where_it_would_observe_something_else(tmp_path: Pa
     about = {"layout": {"observation": parts(tilt=1, joints=2), "privileged": []}}
     save_network(StudentNetwork(**ARCHITECTURE), ARCHITECTURE, tmp_path, "student", about)  # type: ignore[arg-type]
     load_policy(tmp_path, {"observation": parts(tilt=1, joints=2, box=4), "privileged": parts(mass=1)})
-    with pytest.raises(StageFailed, match=r"what differs: torque \(2\)"):
+    with pytest.raises(StageFailed, match=r"what differs: joints \(2\), torque \(2\)"):
         load_policy(tmp_path, {"observation": parts(tilt=1, torque=2, joints=2), "privileged": []})
     with pytest.raises(StageFailed, match="their order"):
         load_policy(tmp_path, {"observation": parts(joints=2, tilt=1), "privileged": []})
