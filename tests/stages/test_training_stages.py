@@ -375,6 +375,7 @@ def test_the_student_of_a_student_begins_as_its_copy(tmp_path: Path) -> None:
     first, *_ = rows(job.work)
     assert first["action_rmse"] < 1e-5
     assert first["kl"] < 1.0, "of the standard deviations alone"
-    shorter = changed(recipe, "distill.history", 10)
-    with pytest.raises(StageFailed, match=r"distill\.history is 10, that student's 25"):
-        distill.STAGE.run(make_job(tmp_path / "shorter", shorter, inputs=inputs, workers=0))
+    for place, (name, value) in enumerate({"history": 10, "observe_object": False}.items()):
+        other = changed(recipe, f"distill.{name}", value)
+        with pytest.raises(StageFailed, match=r"this expert's (history has size 25|observation has)"):
+            distill.STAGE.run(make_job(tmp_path / str(place), other, inputs=inputs, workers=0))
