@@ -1,4 +1,4 @@
-"""What determines a result besides its key: the code, as digests of all modules that a stage imports, and versions.
+"""Digests of the modules that a stage imports, and versions of packages; with its key they determine a result.
 
 Machines whose `identity` is the same give the same results.
 """
