@@ -45,7 +45,7 @@ COMMANDS = {
     ),
     "robot-sim": ("robot", "Simulate a robot on the bus, which `iowbc robot` can drive."),
     "ui": ("ui", "Open MLflow's web interface for the runs, on this machine only."),
-    "schema": ("init", "Write the JSON Schema of recipes, for editors."),
+    "schema": ("schema", "Write the JSON Schema of recipes, for editors."),
     "doctor": ("doctor", "Check versions, binaries, rendering, cores, memory and disk."),
 }
 """Module in `iowbc.commands` and help of each command, in the order of `iowbc --help`."""

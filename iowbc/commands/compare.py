@@ -107,7 +107,7 @@ def report(
     """Write one self-contained HTML file about runs, readable offline. Raises `UsageError`."""
     store, console = Store(Runs(runs)), stdout_console()
     if log is not None:
-        from iowbc.commands.robot import report_log
+        from iowbc.commands.robot_log import report_log
 
         report_log(console, words[0], log, output or log.with_suffix(".png"))
         return
