@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from iowbc.errors import NoRenderer
+from iowbc.evaluation.trials.fixed_batch import in_batch
 from iowbc.evaluation.trials.plan import Trial
-from iowbc.evaluation.trials.rollout import in_batch, play_in
+from iowbc.evaluation.trials.rollout import play_in
 from iowbc.evaluation.trials.table import replayed
 from iowbc.evaluation.trials.trace import Outcome
 from iowbc.learning.acting import Policy
