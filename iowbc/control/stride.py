@@ -52,7 +52,6 @@ class Stride(Constants):
         both legs [m].
         """
         xp, legs, pitch = namespace(posture), self.legs, pelvis_pitch[:, None]
-        phase = (phase + self._settings.lead * self._settings.frequency) % 1.0
         hip, knee = posture[:, self._joints[HIP_PITCH]], posture[:, self._joints[KNEE]]
         thigh = pitch + hip
         x, z = pitched(direction(thigh), *_ankle(legs, knee))

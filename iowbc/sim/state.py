@@ -72,8 +72,6 @@ class SimulationState:
     """Sole centres, left and right, (n, 2, 3) [m]."""
     foot_velocity: Array
     """Velocity of the sole centres, (n, 2, 3) [m/s]."""
-    foot_tilt: Array
-    """Squared sine of the angle between each sole and the horizontal, (n, 2)."""
     foot_force: Array
     """Contact force of the ground on each foot, (n, 2, 3) [N]."""
     foot_contact: Mask
@@ -124,7 +122,6 @@ class SimulationState:
         of_sides = ("foot_position", "foot_velocity", "foot_force", "grip_force")
         single = ("hand_weight_share", "link_object_force", "partner_energy", "partner_share")
         real: dict[str, tuple[int, ...]] = dict.fromkeys(of_joints, (joints,)) | dict.fromkeys(of_sides, (2, 3))
-        real["foot_tilt"] = (2,)
         real |= dict.fromkeys(single, ()) | dict.fromkeys(("base_quaternion", "object_quaternion"), (4,))
         real |= dict.fromkeys(("base_rotation", "torso_rotation"), (3, 3)) | {"external_force": (6,)}
         arrays: dict[str, Any] = {}

@@ -276,7 +276,6 @@ class World:
         state.foot_position[place] = sole
         spatial = self._spatial_velocity[:, layout.feet]
         state.foot_velocity[place] = spatial[..., 3:] + rotations.cross(spatial[..., :3], sole - com[:, None])
-        state.foot_tilt[place] = 1.0 - np.square(self._body_rotation[:, layout.feet, 8])
         force = self._external[:, FEET, 3:]
         state.foot_force[place] = force
         state.foot_contact[place] = force[:, :, 2] > self.physics.contact_force

@@ -106,9 +106,6 @@ class GaitConstraint(Section):
     `touchdown_height`."""
     touchdown_height: float = Field(default=0.02, gt=0.0, json_schema_extra=LATER)
     """Height of a sole at which `touchdown` counts 37 % [m]."""
-    sole_tilt: float = Field(default=0.0, json_schema_extra=LATER)
-    """Weight of the squared sine of the angle between sole and ground, summed over the swinging feet: a tilted foot
-    meets the ground early, with its edge, while it is still fast."""
     standing: float = -1.0
     """Weight of the number of feet off the ground while the clock rests."""
     recovery: float = Field(default=0.0, json_schema_extra=LATER)

@@ -109,7 +109,6 @@ TERMS: dict[str, Term] = {
     "gait.touchdown": lambda s: terms.touchdown(
         s.state.foot_position[:, :, 2], s.state.foot_velocity[:, :, 2], s.recipe.gait.touchdown_height
     ),
-    "gait.sole_tilt": lambda s: (s.state.foot_tilt * ~s.stance).sum(axis=1),
     "gait.standing": lambda s: (~s.state.foot_contact).sum(axis=1) * ~s.stepping,
     "gait.recovery": lambda s: s.stepping & ~s.commanded,
     "gait.foot_distance": lambda s: terms.foot_distance(s.motion.foot_position, s.recipe.gait.smallest_foot_distance),
