@@ -33,7 +33,7 @@ from iowbc.rollouts.blocks import block_size
 from iowbc.rollouts.rollout_policies import ExploringPolicy
 from iowbc.stages.environments import RemoteWorkers
 from iowbc.stages.eval import play_everywhere
-from iowbc.stages.labelling import SHARES, label_everywhere
+from iowbc.stages.label_everywhere import SHARES, label_everywhere
 from iowbc.stages.rg_dataset import CHUNK
 from iowbc.task.layout import full_layout
 from iowbc.task.specification import Specification

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from iowbc.errors import StageFailed
 from iowbc.pipeline.stage import Job, Stage
-from iowbc.stages.labelling import label_everywhere
+from iowbc.stages.label_everywhere import label_everywhere
 
 if TYPE_CHECKING:
     from iowbc.reference.labels.shards import Shard
