@@ -139,13 +139,14 @@ def _behaviour_bars(axes: Axes, chosen: pd.DataFrame, column: str, title: str) -
 
 
 def _impedance_curves(axes: Axes, pulls: pd.DataFrame, variants: list[str]) -> None:
-    """Magnitude over frequency, one curve per variant and direction."""
-    axes.set_title("mechanical impedance [N·s/m]")
+    """Magnitude over frequency, one curve per variant and direction; dashed except forward."""
+    axes.set_title("mechanical impedance [N·s/m]; dashed: to the left")
     for (variant, direction), rows in pulls.groupby(["variant", "pull_direction"], sort=False):
         ordered = rows.sort_values("pull_frequency")
         size = np.hypot(ordered["impedance_real"], ordered["impedance_imag"])
-        style = style_of(str(variant), variants) | {"linestyle": "-" if direction == "forward" else "--"}
-        axes.plot(ordered["pull_frequency"], size, label=f"{variant}, {direction}", **style)
+        forward = direction == "forward"
+        style = style_of(str(variant), variants) | {"linestyle": "-" if forward else "--"}
+        axes.plot(ordered["pull_frequency"], size, label=str(variant) if forward else None, **style)
     axes.set_xlabel("frequency of the pull [Hz]")
     tidy(axes)
     if len(pulls):
@@ -153,7 +154,6 @@ def _impedance_curves(axes: Axes, pulls: pd.DataFrame, variants: list[str]) -> N
         axes.set_xscale("log")
         axes.set_xticks(frequencies, [f"{frequency:g}" for frequency in frequencies])
         axes.set_xticks([], minor=True)
-        axes.legend(fontsize=8, frameon=False)
 
 
 def _value(row: pd.Series) -> complex:
