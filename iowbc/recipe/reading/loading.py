@@ -14,6 +14,8 @@ from iowbc.recipe.recipe import Recipe
 
 SUFFIXES = (".yaml", ".yml")
 PACKAGE = Path(__file__).resolve().parents[2]
+FOLDERS = (Path("recipes"), PACKAGE.parent / "recipes", PACKAGE / "recipes")
+"""Folders in which recipes are found by name, in order of precedence."""
 LARGEST_FILE = 1_000_000
 """Largest size of a recipe file [bytes]."""
 LONGEST_PATH = 300
@@ -25,15 +27,16 @@ OWN_KEYS = ("name", "description")
 
 
 def recipe_file(word: str | Path) -> Path:
-    """Resolve a path, or a bare name with or without extension, to a recipe file.
+    """Resolve a path, or the name of a recipe with or without extension (`full`, `experts/quick`), to a recipe file.
 
     Names are searched in `./recipes`, the recipes of this checkout, and those of the installed package; the first match
     counts. Without a match the word is returned as a path, and reading it raises the error.
     """
     path = Path(word)
-    if os.path.isfile(path) or path.name != str(word):
+    if os.path.isfile(path) or ".." in path.parts:
         return path
-    return next((found for found in known_files() if path.name in (found.stem, found.name)), path)
+    found = (folder / f"{word}{ending}" for folder in FOLDERS for ending in ("", *SUFFIXES))
+    return next(filter(os.path.isfile, found), path)
 
 
 def file_meant_in(folder: Path, word: str) -> Path:
@@ -45,7 +48,7 @@ def file_meant_in(folder: Path, word: str) -> Path:
 
 def known_files() -> Iterator[Path]:
     """Recipes that can be named without their folder, in order of precedence."""
-    for folder in (Path("recipes"), PACKAGE.parent / "recipes", PACKAGE / "recipes"):
+    for folder in FOLDERS:
         for suffix in SUFFIXES:
             yield from sorted(folder.glob(f"*{suffix}"))
 
