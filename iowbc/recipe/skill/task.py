@@ -78,7 +78,7 @@ def _push(path: tuple[Stretch, ...], duration: float) -> TransportTask:
 
 def _lift(path: tuple[Stretch, ...], duration: float) -> TransportTask:
     """A box of twice the mass that the robot alone carries."""
-    return TransportTask(scene="lift", path=path, mass=(12.0, 15.0), duration=duration)
+    return TransportTask(scene="lift", path=path, mass=(14.0, 17.0), duration=duration)
 
 
 class Tasks(NamedEntries):
