@@ -77,7 +77,7 @@ def _push(path: tuple[Stretch, ...], duration: float) -> TransportTask:
 
 
 def _lift(path: tuple[Stretch, ...], duration: float) -> TransportTask:
-    """A box of twice the mass that the robot alone carries."""
+    """A box that `compliant_merged` cannot carry alone for the length of a game."""
     return TransportTask(scene="lift", path=path, mass=(14.0, 17.0), duration=duration)
 
 
