@@ -35,15 +35,19 @@ def recipe_file(word: str | Path) -> Path:
     path = Path(word)
     if os.path.isfile(path) or ".." in path.parts:
         return path
-    found = (folder / f"{word}{ending}" for folder in FOLDERS for ending in ("", *SUFFIXES))
-    return next(filter(os.path.isfile, found), path)
+    return next(filter(os.path.isfile, (file for folder in FOLDERS for file in _spelled(folder, path))), path)
 
 
 def file_meant_in(folder: Path, word: str) -> Path:
     """Resolve `extends`, `teacher.start` or one of `variants` in a recipe in `folder`: a file in that folder, with or
     without extension, else as `recipe_file` does."""
-    beside = [Path(os.path.normpath(folder / f"{word}{ending}")) for ending in ("", *SUFFIXES)]
-    return next((found for found in (*beside, recipe_file(word)) if os.path.isfile(found)), beside[0])
+    beside = _spelled(folder, word)
+    return next(filter(os.path.isfile, (*beside, recipe_file(word))), beside[0])
+
+
+def _spelled(folder: Path, word: str | Path) -> list[Path]:
+    """The paths in a folder that a name with or without extension may mean."""
+    return [Path(os.path.normpath(folder / f"{word}{ending}")) for ending in ("", *SUFFIXES)]
 
 
 def known_files() -> Iterator[Path]:
