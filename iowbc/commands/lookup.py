@@ -38,12 +38,12 @@ CHECKPOINT = Path("scratch", "training.checkpoint")
 
 def named(store: Store, word: str) -> Run:
     """The meaning of a recipe's name or file, `RECIPE/STAGE`, or the first characters of a key. Raises `UsageError`."""
-    recipes = finished_recipes(store)
+    recipes, published = finished_recipes(store), _published(store)
     if word in recipes or Path(word).suffix in SUFFIXES:
-        return _recipe(store, word, _name_in(word), recipes)
+        return _recipe(store, word, _name_in(word), published)
     head, slash, stage = word.rpartition("/")
     if slash and (name := _name_in(head)) in recipes:
-        found = _recipe(store, word, name, recipes).usable
+        found = _recipe(store, word, name, published).usable
         if stage not in found:
             stages = ", ".join(found) or "none"
             raise UsageError(f"{word}: recipe {name} has no finished stage '{stage}'; finished: {stages}")
@@ -74,8 +74,8 @@ def finished_recipes(store: Store) -> list[str]:
 
 def known_names(store: Store) -> dict[str, tuple[str, ...]]:
     """Recipes that `named` accepts, alphabetically, with the stages of each that can be named."""
-    names = finished_recipes(store)
-    return {name: tuple(_recipe(store, name, name, names).usable) for name in names}
+    published = _published(store)
+    return {name: tuple(_recipe(store, name, name, published).usable) for name in finished_recipes(store)}
 
 
 def last_used(store: Store, recipe: str) -> dict[str, Artifact]:
@@ -85,13 +85,14 @@ def last_used(store: Store, recipe: str) -> dict[str, Artifact]:
     return {stage: artifact for stage, artifact in found.items() if artifact is not None}
 
 
-def _recipe(store: Store, word: str, name: str, recipes: Sequence[str]) -> Run:
-    if name not in recipes:
-        listing = ", ".join(recipes) or "none"
+def _recipe(store: Store, word: str, name: str, published: Mapping[str, Mapping[str, Artifact]]) -> Run:
+    known, shipped = known_recipes(store), published.get(name, {})
+    if name not in known and not shipped:
+        listing = ", ".join(sorted({*known, *published})) or "none"
         raise UsageError(f"recipe {word} has no finished stage in {store.runs.root}; those that have: {listing}")
-    shipped = _published(store).get(name, {})
-    if name not in known_recipes(store):
-        return Run(word, shipped, list(shipped.values())[-1].recipe)
+    if name not in known:
+        own = [artifact for artifact in shipped.values() if artifact.manifest.recipe == name]
+        return Run(word, shipped, own[-1].recipe)
     used = last_used(store, name)
     others = {stage: artifact for stage, artifact in shipped.items() if stage not in used}
     return Run(word, used, recall(store.runs, name).recipe, others)
@@ -105,13 +106,19 @@ def _name_in(word: str) -> str:
 
 
 def _published(store: Store) -> dict[str, dict[str, Artifact]]:
-    """By the recipe that made them, and by stage: the artifacts that came with the repository."""
+    """By recipe, and by stage: the artifacts that came with the repository, and those that they were made from, which
+    another recipe may have made first."""
+    published = [one for stage in PIPELINE for one in store.artifacts(stage) if one.published]
     found: dict[str, dict[str, Artifact]] = {}
-    for stage in PIPELINE:
-        for artifact in store.artifacts(stage):
-            if artifact.published:
-                found.setdefault(artifact.manifest.recipe, {})[stage] = artifact
-    return found
+    for artifact in published:
+        found.setdefault(artifact.manifest.recipe, {})[artifact.manifest.stage] = artifact
+    contents = {(artifact.manifest.stage, artifact.manifest.digest): artifact for artifact in published}
+    for own in found.values():
+        for stage in reversed(PIPELINE):
+            read = own[stage].ingredients.get("inputs", {}) if stage in own else {}
+            for source in read.items() & contents.keys():
+                own.setdefault(source[0], contents[source])
+    return {recipe: {stage: own[stage] for stage in PIPELINE if stage in own} for recipe, own in found.items()}
 
 
 def _by_key(store: Store, prefix: str) -> Artifact:

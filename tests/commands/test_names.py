@@ -68,6 +68,18 @@ def test_what_is_published_goes_by_its_recipes_name_before_anything_ran(
     assert open_artifact("first/export", folder / "runs").published
 
 
+def test_what_was_published_for_another_recipe_is_found_by_each_that_used_it(folder: Path, command: Command) -> None:
+    for name in ("first", "second"):
+        assert command("publish", f"{name}.yaml").returncode == 0
+    for name in ("store", "recipes", "first", "second"):
+        shutil.rmtree(folder / "runs" / name)
+    store = Store(Runs(folder / "runs"))
+    found, own = named(store, "second"), [one for one in store.artifacts() if one.manifest.recipe == "second"]
+    assert [*found.artifacts] == ["rg-dataset", "rg-fit", "teacher", "distill", "export"]
+    assert 0 < len(own) < len(found.artifacts)
+    assert found.recipe == own[-1].recipe
+
+
 def test_a_run_that_has_begun_does_not_hide_what_is_published_until_it_has_its_own(
     folder: Path, command: Command, key: Key
 ) -> None:

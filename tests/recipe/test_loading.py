@@ -246,6 +246,8 @@ def test_a_recipe_is_found_by_its_name_here_first_then_in_the_package(
         load_recipe("quikstart")
     assert load_recipe("smoke.yaml").recipe.name == "smoke"
     assert load_recipe("experts/quick").recipe.name == "quick"
+    with pytest.raises(RecipeError, match=r"^recipe experts/quikc: .*by name: experts/.*did you mean 'experts/quick'"):
+        load_recipe("experts/quikc")
 
 
 def test_an_override_goes_before_the_file_and_is_its_own_place(tmp_path: Path) -> None:

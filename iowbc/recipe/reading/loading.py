@@ -50,11 +50,12 @@ def _spelled(folder: Path, word: str | Path) -> list[Path]:
     return [Path(os.path.normpath(folder / f"{word}{ending}")) for ending in ("", *SUFFIXES)]
 
 
-def known_files() -> Iterator[Path]:
-    """Recipes that can be named without their folder, in order of precedence."""
+def known_files(inside: Path = Path()) -> Iterator[Path]:
+    """Recipes that can be named without their folder, or as `experts/NAME` for those in a folder of recipes, in order
+    of precedence."""
     for folder in FOLDERS:
         for suffix in SUFFIXES:
-            yield from sorted(folder.glob(f"*{suffix}"))
+            yield from sorted((folder / inside).glob(f"*{suffix}"))
 
 
 def overridden(tree: Located, overrides: Sequence[str]) -> Located:
@@ -216,9 +217,10 @@ def _listed(missing: Path) -> str:
     """Alternatives to a missing file: files beside it, if its name has an extension, and recipes by name."""
     folder, with_ending = missing.parent, missing.suffix in SUFFIXES
     beside = sorted(found.name for found in folder.glob("*.yaml")) if with_ending and folder.is_dir() else []
-    elsewhere = list(dict.fromkeys(found.name for found in known_files() if found.parent != folder))
-    names = [Path(name).stem for name in elsewhere]
+    inside = folder if not folder.is_absolute() and any(known_files(folder)) else Path()
+    found = dict.fromkeys(inside / one.name for one in known_files(inside) if one.parent != folder)
+    elsewhere, names = [str(one) for one in found], [str(one.with_suffix("")) for one in found]
     parts = [f"recipes in {folder}: {', '.join(beside)}"] if beside else []
     parts += [f"recipes by name: {', '.join(names)}"] if names else []
     choices = [*beside, *elsewhere] if with_ending else names
-    return "".join(f"; {part}" for part in parts) + nearest(missing.name, choices)
+    return "".join(f"; {part}" for part in parts) + nearest(str(inside / missing.name), choices)
