@@ -59,7 +59,7 @@ def swing_progress(foot_phase: Array, stance: float) -> Array:
 
 def swing_height(progress: Array, gait: GaitPrior) -> Array:
     """Height of the soles above the ground by the recipe's profile, of their progress in swing, (n, 2) [m]."""
-    sine = namespace(progress).sin(np.pi * progress ** float(np.log(0.5) / np.log(gait.peak)))
+    sine = namespace(progress).sin(np.pi * progress)
     return gait.swing_clearance * (sine if gait.profile == "sine" else sine * sine)
 
 

@@ -69,9 +69,7 @@ class Judge:
         follow(memory, target, error, disturbed, self._task.termination, self._period)
         pushed = state.has_object & ~self._holding
         ending = self._ending(state, memory, moved, place, error, pushed)
-        prior = self._task.references.gait
-        phase = (memory.phase - self._task.reward.gait.lag * prior.frequency) % 1.0
-        foot_phase, stance = gait.foot_phase(phase), prior.stance
+        foot_phase, stance = gait.foot_phase(memory.phase), self._task.references.gait.stance
         step = Step(
             state=state,
             motion=moved,

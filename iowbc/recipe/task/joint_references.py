@@ -146,8 +146,6 @@ class GaitPrior(Section):
     profile: Literal["sine", "rest"] = Field(default="sine", json_schema_extra=LATER)
     """Height over the swing: clearance·sin(π·progress), which lands at 0.81 m/s, or clearance·sin²(π·progress), which
     lifts off and lands at rest."""
-    peak: float = Field(default=0.5, gt=0.0, lt=1.0, json_schema_extra=LATER)
-    """Progress of the swing at which the sole is highest: earlier, and it comes down more slowly."""
     sway: float = Field(default=0.02, ge=0.0)
     """Amplitude of the pelvis' lateral motion over the stance foot [m]. A 0.7 m pendulum that steps from side to side
     every 0.37 s, between feet 0.24 m apart, sways by 0.022 m."""

@@ -98,9 +98,6 @@ class GaitConstraint(Section):
     """Weight of the fraction of feet whose contact state matches the gait phase, scaled to −1 to 1."""
     swing_height: Kernel = Kernel(weight=1.5, width=0.04)
     """Height error of the swing foot against the gait prior's profile [m]; only while a foot swings."""
-    lag: float = Field(default=0.0, ge=0.0, json_schema_extra=LATER)
-    """Time by which feet may follow the gait clock [s], in all terms by its phase: latencies and motors delay them, and
-    a foot that has to land on time hurries down."""
     foot_slip: float = -1.0
     """Weight of the sliding speed of the soles, averaged with the load of each as weight [m/s]. With squared speeds, a
     slide of 0.1 m/s cost almost nothing, and walking feet slid 0.3 m per metre."""
