@@ -12,18 +12,11 @@ from iowbc.adapters.networks import network
 from iowbc.arrays import Array
 from iowbc.errors import StageFailed
 from iowbc.files import read_limited
+from iowbc.robot.g1_motors import MOTORS
 
 CONFIGURATION = "deploy.yaml"
 LARGEST = 1 << 20
 """Maximum size of a configuration file [bytes]."""
-LEG = ("hip_pitch", "hip_roll", "hip_yaw", "knee", "ankle_pitch", "ankle_roll")
-ARM = ("shoulder_pitch", "shoulder_roll", "shoulder_yaw", "elbow", "wrist_roll", "wrist_pitch", "wrist_yaw")
-MOTORS = (
-    *(f"{side}_{part}_joint" for side in ("left", "right") for part in LEG),
-    *(f"waist_{part}_joint" for part in ("yaw", "roll", "pitch")),
-    *(f"{side}_{part}_joint" for side in ("left", "right") for part in ARM),
-)
-"""The G1's 29 joints in motor order."""
 FIELDS = {
     "base_ang_vel": "angular_velocity",
     "projected_gravity": "gravity",

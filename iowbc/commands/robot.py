@@ -62,6 +62,8 @@ def robot(
     from iowbc.onboard.process import LockStep, MonotonicClock, drive, enable_realtime, listen
 
     console = stdout_console()
+    if lockstep and network != "lo":
+        raise UsageError("--lockstep is for a simulated robot on this machine (--network lo); a robot does not wait")
     controller = Controller.load(exported_folder(what))
     require_known(scene, "scene", [name for name, _ in controller.contract.references.grasps])
     source = operator(commands, controller.contract)
@@ -72,8 +74,11 @@ def robot(
         stack.callback(bus.close)
         tell(console, f"{controller.contract.recipe}: listening on {network} for {LISTENING:g} s")
         standing = Ranges(controller.contract).standing
-        found = checks(controller, listen(bus, LISTENING), standing, LIMITS)
-        own_pace = ("states",) if lockstep else ()
+        heard = listen(bus, LISTENING, stop.is_set)
+        if stop.is_set():
+            return
+        found = checks(controller, heard, scene, standing, LIMITS)
+        own_pace = ("states",) if lockstep and heard.states else ()
         report_checks(console, found, (*(waive or ()), *own_pace))
         if dry_run:
             return
@@ -108,24 +113,27 @@ def robot(
 
 def _stop_request() -> threading.Event:
     stop = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
         signal.signal(number, lambda *_: stop.set())
     return stop
 
 
 def report_checks(console: Console, found: "list[CheckResult]", waived: Collection[str]) -> None:
-    """Print the checks. Raises UsageError for failed ones that are not waived."""
+    """Print the checks. Raises UsageError for failed ones that are not waived, and for those that cannot be."""
+    from iowbc.onboard.checks import CHECKS
+
     for name in waived:
-        require_known(name, "check", [check.name for check in found])
+        require_known(name, "check", CHECKS)
     table = plain_table("check", "", "found")
     for check in found:
-        verdict = "ok" if check.passed else "waived" if check.name in waived else "FAILED"
+        verdict = "ok" if check.passed else "waived" if check.name in waived and check.waivable else "FAILED"
         table.add_row(check.name, verdict, check.text)
     console.print(table)
-    if failed := [check.name for check in found if not check.passed and check.name not in waived]:
-        raise UsageError(
-            f"{', '.join(failed)}: failed, nothing was sent; put it right, or pass --waive {failed[0]} if you know why"
-        )
+    failed = [check for check in found if not check.passed and not (check.waivable and check.name in waived)]
+    if failed:
+        names, (first, *_) = ", ".join(check.name for check in failed), failed
+        other = f", or pass --waive {first.name} if you know why" if first.waivable else ""
+        raise UsageError(f"{names}: failed, nothing was sent; put it right{other}")
 
 
 def robot_sim(

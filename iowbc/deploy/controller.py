@@ -92,7 +92,10 @@ class Controller:
         if "object_quaternion" in self._good:
             self._good["object_quaternion"][:, 0] = 1.0
         self.inputs: Values = {}
+        """Inputs of the last step, with the last good ones of robots whose own were refused."""
         self.outputs: Values = {}
+        self.targets: Array = np.zeros((robots, len(contract.joints)))
+        """Joint targets of the last step, (n, joints) [rad]."""
         self._scene = {name: np.zeros(shapes[name], np.float32) for name in ("grasp", "load")}
         self._state = np.zeros(shapes["state"], np.float32)
         self._starts: Mask = np.ones(robots, np.bool_)
@@ -129,6 +132,11 @@ class Controller:
             if found != (said := {port.name: port.shape for port in ports}):
                 raise ContractBroken(f"{folder / name}: inputs are {found}, the contract says {said}; export again")
             sessions.append(session)
+            traced = session.get_modelmeta().custom_metadata_map.get("contract", "{}")
+            if Contract.model_validate_json(traced) != contract.model_copy(update={"files": {}}):
+                raise ContractBroken(
+                    f"{folder / CONTRACT}: differs from the contract with which {name} was made; export again"
+                )
         controller = cls(contract, robot, sessions[0], sessions[1], robots, limits)
         state = {"state": next(port for port in contract.inputs if port.name == "state").shape}
         with readable(folder / SETTLE):
@@ -183,7 +191,7 @@ class Controller:
         refused[list(refusals)] = True
         self._state = np.where(refused[:, None], self._state, after)
         self._starts = self._starts & refused
-        self.inputs, self.outputs = inputs, outputs
+        self.inputs, self.outputs, self.targets = inputs, outputs, passed
         return Targets(passed, self._kp, self._kd, outputs["action"], outputs["support_reference"], held, reasons)
 
     def settled_posture(self, command: Array) -> Array:

@@ -6,6 +6,7 @@ targets = controller.step(measured, command)
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal, Self
 
@@ -22,6 +23,7 @@ from iowbc.control.skill_command import SkillCommand
 from iowbc.control.skill_observation import SENSED, WAYPOINTS, YAW, of_object, robot_observation
 from iowbc.deploy.contract import parsed, readable, require_sealed, require_unchanged
 from iowbc.deploy.controller import Controller, base_grasp, open_session, run
+from iowbc.deploy.plausibility import WIDE, Plausibility
 from iowbc.errors import ContractBroken
 from iowbc.files import file_digest
 from iowbc.recipe.section import Section
@@ -93,6 +95,7 @@ class Skill:
         self._largest_step = rate_limits(contract.commands.rates) / controller.frequency
         self._pushing: Mask = np.full(n, pushing)
         self._rule = SkillCommand(contract.robot, contract.commands, self._pushing)
+        self._plausibility = Plausibility(controller.contract, WIDE, n)
         self.observation = np.zeros((n, contract.observation), np.float32)
         """Last observation of the skill, (n, size)."""
         self.reset()
@@ -129,8 +132,10 @@ class Skill:
     def step(self, measured: Measured) -> Array:
         """Commands C, (n, 11), for the next control period; a decision takes effect one period later, as in training.
 
-        A robot with non-finite measurements keeps its command. Raises ValueError for a missing quantity.
+        A robot with an implausible measurement is taken to be where the controller last saw it; a decision that is not
+        finite keeps the command. Raises ValueError for a missing quantity.
         """
+        measured = self._plausible(measured)
         if self._yaw is not None:
             action = run(self._session, {"observation": self.observation})["action"]
             nominal = self._rule.following(self._felt[:, -1].sum(axis=1), self._yaw)
@@ -138,11 +143,22 @@ class Skill:
             whole: Mask = np.asarray(np.isfinite(decided).all(axis=1))[:, None]
             self._command = np.where(whole, decided, self._command)
         if self._passed:
-            target = self._controller.outputs["target"].astype(np.float64)
-            self._hands.add(target, measured.joint_position, measured.joint_velocity)
+            self._hands.add(self._controller.targets, measured.joint_position, measured.joint_velocity)
         self._yaw = self._sense(measured) if self._passed % self._every == 0 else None
         self._passed += 1
         return self._command.copy()
+
+    def _plausible(self, measured: Measured) -> Measured:
+        """The measurements, with the last ones that the controller used where a robot's are not plausible."""
+        values = {name: getattr(measured, name) for name in self._plausibility.names if name != "command"}
+        if not self._controller.inputs or any(value is None for value in values.values()):
+            return measured
+        given = {name: np.array(value, np.float64) for name, value in values.items()}
+        with np.errstate(over="ignore", invalid="ignore"):
+            refused = [*self._plausibility.refusals(given | {"command": self._command}, None)]
+        for name, value in given.items():
+            value[refused] = self._controller.inputs[name][refused]
+        return replace(measured, **given)
 
     def _sense(self, measured: Measured) -> Array:
         """Observes for the decision of the next step, which spreads the work over two steps; yaw of the objects (n,)

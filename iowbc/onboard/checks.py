@@ -13,6 +13,7 @@ from iowbc.deploy.controller import Controller
 from iowbc.onboard.messages import Record
 from iowbc.onboard.sensors import MeasuredState, Sensors
 from iowbc.recipe.section import Section
+from iowbc.robot.g1_motors import MOTORS
 
 
 class SafetyLimits(Section):
@@ -58,6 +59,8 @@ class SafetyLimits(Section):
 LIMITS = SafetyLimits()
 
 
+CHECKS = ("states", "model", "ankles", "mode", "publishers", "joints", "battery", "temperature", "policy")
+"""Names of the checks."""
 MODEL = 5
 """`mode_machine` of the G1 with 29 joints, revision 1.0, whose masses and gears the MJCF has."""
 PITCH_ROLL = 0
@@ -75,6 +78,8 @@ class CheckResult:
     name: str
     passed: bool
     text: str
+    waivable: bool = True
+    """False if the robot must not be driven while the check fails."""
 
 
 @dataclass(frozen=True)
@@ -90,12 +95,18 @@ class BusSnapshot:
     """The robot's active built-in controller: "" for none, None without an answer."""
 
 
-def checks(controller: Controller, heard: BusSnapshot, wanted: Array, limits: SafetyLimits) -> list[CheckResult]:
-    """All checks, most important first; `wanted`: the command to stand, (11,)."""
+def checks(
+    controller: Controller, heard: BusSnapshot, scene: str, wanted: Array, limits: SafetyLimits
+) -> list[CheckResult]:
+    """All checks, most important first; `wanted`: the command to stand, (11,). Without a state, or for a robot with
+    other motors, the first alone."""
     contract = controller.contract
     if not heard.states:
         text = f"no rt/lowstate in {heard.seconds:g} s: is the robot on, is the network right?"
-        return [CheckResult("states", False, text)]
+        return [CheckResult("states", False, text, waivable=False)]
+    if contract.joints != MOTORS:
+        text = f"{len(contract.joints)} joints, which are not the {len(MOTORS)} motors of the G1 in their order"
+        return [CheckResult("model", False, text, waivable=False)]
     sensors = Sensors(len(contract.joints))
     sensors.take(tuple(heard.states), heard.seconds)
     assert sensors.posture is not None
@@ -117,15 +128,15 @@ def checks(controller: Controller, heard: BusSnapshot, wanted: Array, limits: Sa
         CheckResult("joints", outside is None, outside or "within limits, no motor overloaded, upright enough"),
         CheckResult("battery", charge is not None and charge >= limits.battery, battery),
         CheckResult("temperature", warmest <= hottest, f"warmest motor {warmest:.0f} °C, {hottest:g} allowed"),
-        _dry_run(controller, sensors, wanted),
+        _dry_run(controller, sensors, scene, wanted),
     ]
 
 
-def _dry_run(controller: Controller, sensors: Sensors, wanted: Array) -> CheckResult:
+def _dry_run(controller: Controller, sensors: Sensors, scene: str, wanted: Array) -> CheckResult:
     """Dry run: policy steps on the measured posture; no command is sent."""
     if not quantities(of_object=True).keys().isdisjoint(port.name for port in controller.contract.inputs):
-        return CheckResult("policy", True, "observes the object: tried when its pose arrives")
-    controller.reset()
+        return CheckResult("policy", True, "observes the object: not tried, because its pose is not known yet")
+    controller.reset(scene=scene)
     default, furthest, joint = np.array(controller.contract.default_position), 0.0, 0
     for step in range(DRY_STEPS):
         targets = controller.step(sensors.measured, wanted, measured_at=float(step))

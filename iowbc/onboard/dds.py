@@ -1,5 +1,6 @@
 """The G1's bus over Cyclone DDS. Records are sent as raw bytes, without intermediate objects."""
 
+import contextlib
 import json
 import time
 import types
@@ -86,6 +87,15 @@ def _configured(domain: int, configuration: str) -> Domain:
     return Domain(domain, configuration)
 
 
+def _mode_name(response: Any) -> str | None:
+    """Name of the controller in an answer of the motion switcher; None if it reports an error or no name."""
+    with contextlib.suppress(ValueError):
+        found = json.loads(response.data)
+        if response.header.status.code == 0 and isinstance(found, dict) and isinstance(found.get("name"), str):
+            return str(found["name"])
+    return None
+
+
 class DdsBus:
     """A participant of the bus; the kind of a message determines its topic."""
 
@@ -141,8 +151,9 @@ class DdsBus:
             writer.write(Request_(asked, "{}", []))
             waiting.wait(duration(seconds=0.2))
             for sample in reader.take(KEPT):
-                if isinstance(sample, Response_) and sample.header.identity.id == number:
-                    return str(json.loads(sample.data or "{}").get("name", ""))
+                ours = isinstance(sample, Response_) and sample.header.identity.id == number
+                if ours and (name := _mode_name(sample)) is not None:
+                    return name
         return None
 
     def answer_mode_requests(self) -> None:

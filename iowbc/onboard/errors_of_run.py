@@ -38,9 +38,12 @@ class LoggedRun:
 
     @property
     def wanted_heading(self) -> Array:
-        """Heading at the start plus the integrated yaw rate commanded, (T,) [rad]."""
+        """Heading at the start, and after each pause, plus the integrated yaw rate commanded, (T,) [rad]."""
         period = np.diff(self.time, prepend=self.time[0])
-        wanted: Array = self.heading[0] + np.cumsum(self.command[:, YAW_RATE] * period)
+        paused = period > PAUSE
+        turned = np.cumsum(self.command[:, YAW_RATE] * np.where(paused, 0.0, period))
+        begin = np.maximum.accumulate(np.where(paused, np.arange(len(period)), 0))
+        wanted: Array = self.heading[begin] + turned - turned[begin]
         return wanted
 
     def deviations(self) -> dict[str, Array]:
@@ -53,6 +56,8 @@ class LoggedRun:
         }
 
 
+PAUSE = 0.5
+"""Time between two rows after which another run begins [s]."""
 UNITS = {"E_v": "m/s", "E_ψ": "rad", "E_α": "rad", "E_h": "m"}
 
 

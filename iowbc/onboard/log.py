@@ -3,6 +3,7 @@
 All messages of a cycle of the loop share a time stamp: first `inputs`, last the low-level command.
 """
 
+import contextlib
 import json
 import queue
 import threading
@@ -48,10 +49,13 @@ class LogWriter:
             schema = self._writer.register_schema(topic, "jsonschema", b'{"type": "object"}')
             self._channels[topic] = self._writer.register_channel(topic, "json", schema)
         self._queue: queue.SimpleQueue[tuple[str, float, bytes] | None] = queue.SimpleQueue()
+        self.failure = ""
+        """Reason why the file can no longer be written."""
         self._thread = threading.Thread(target=self._write, name="log")
         self._thread.start()
 
-    def turn(self, given: CycleInputs, command: Record) -> None:
+    def turn(self, given: CycleInputs, command: Record) -> bool:
+        """Logs a cycle; False if the file can no longer be written."""
         wanted = given.wanted
         self.add(
             "inputs",
@@ -68,16 +72,20 @@ class LogWriter:
         for state in given.states:
             self._queue.put((TOPICS[messages.LOW_STATE], given.now, to_cdr(state)))
         self._queue.put((TOPICS[messages.LOW_COMMAND], given.now, to_cdr(command)))
+        return not self.failure
 
     def add(self, topic: str, at_time: float, **values: Any) -> None:
         """A JSON message at a time of the loop [s]."""
         self._queue.put((topic, at_time, json.dumps(values).encode()))
 
     def _write(self) -> None:
-        while (entry := self._queue.get()) is not None:
-            topic, now, data = entry
-            time = round(1e9 * now)
-            self._writer.add_message(self._channels[topic], time, data, time)
+        try:
+            while (entry := self._queue.get()) is not None:
+                topic, now, data = entry
+                time = round(1e9 * now)
+                self._writer.add_message(self._channels[topic], time, data, time)
+        except OSError as error:
+            self.failure = error.strerror or str(error)
 
     def __enter__(self) -> Self:
         return self
@@ -85,8 +93,10 @@ class LogWriter:
     def __exit__(self, *exception: object) -> None:
         self._queue.put(None)
         self._thread.join()
-        self._writer.finish()
-        self._file.close()
+        with contextlib.suppress(OSError):  # the file is readable up to where it ends
+            if not self.failure:
+                self._writer.finish()
+            self._file.close()
 
 
 def read_about(path: Path) -> dict[str, str]:

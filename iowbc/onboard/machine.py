@@ -12,6 +12,7 @@ from types import MappingProxyType
 import numpy as np
 
 from iowbc.arrays import Array
+from iowbc.control.command import COMMAND, HEIGHT
 from iowbc.control.sensors import quantities
 from iowbc.deploy.controller import Controller
 from iowbc.onboard import checks, messages
@@ -88,11 +89,15 @@ class Machine:
         self.events: list[str] = []
         """Events of the last cycle with their reasons: states entered, requests refused, and warnings."""
         self._kp, self._kd = np.array(contract.kp), np.array(contract.kd)
-        self._turns = round(FREQUENCY / contract.control_frequency)
-        """Cycles of the loop per policy step."""
-        self._turn = 0
+        self._period = 1.0 / contract.control_frequency
+        self._due: float | None = None
+        """Time of the next policy step [s]; None before the first one."""
+        self._standing = np.zeros(len(COMMAND))
+        """Command of the standing posture, without velocities."""
         self._last = -np.inf
         self._entered = 0.0
+        self._foreign = -np.inf
+        """Time of the last command of another program [s]."""
         self._charge: float | None = None
         self._warned: set[str] = set()
         self._from = self._goal = self._target = np.array(contract.default_position)
@@ -102,6 +107,7 @@ class Machine:
         self.events = []
         self.sensors.take(given.states, given.now)
         self._charge = self._charge if given.charge is None else given.charge
+        self._foreign = given.now if given.others else self._foreign
         wanted = given.wanted.request
         if self.state in MOVING and (reason := self._fault(given)) is not None:
             self._enter(State.DAMPING, given, reason)
@@ -118,6 +124,11 @@ class Machine:
         if self.state is State.RUN:
             self._act(given)
         return self._command(given.now)
+
+    def damp(self) -> Record:
+        """Low-level command that damps the robot, whatever its state was."""
+        self.state = State.DAMPING
+        return self._command(self._last)
 
     def _fault(self, given: CycleInputs) -> str | None:
         """Reason to damp, or None."""
@@ -153,6 +164,8 @@ class Machine:
             return f"it follows {' or '.join(BEFORE[wanted])}, and the robot is in {self.state}"
         if now is None:
             return "no state has arrived"
+        if given.now - self._foreign < limits.command_age:
+            return "second publisher: another program sends low-level commands"
         if (reason := self._motion_fault(given.now)) is not None:
             return reason
         if now.tilt > limits.standing_tilt:
@@ -180,26 +193,38 @@ class Machine:
         return None
 
     def _enter(self, state: State, given: CycleInputs, why: str) -> None:
-        self.state, self._entered, self._turn = state, given.now, 0
+        self.state, self._entered, self._due = state, given.now, None
         self.events.append(f"{state}: {why}")
         if state is State.STAND:
             self._warned.clear()
             assert self.sensors.posture is not None
             self._from = self.sensors.posture.position
-            self._goal = self.controller.settled_posture(given.wanted.command)[0]
+            self._standing = given.wanted.command.copy()
+            self._standing[:HEIGHT] = 0.0
+            self._goal = self.controller.settled_posture(self._standing)[0]
         elif state is State.RUN:
             self.controller.reset(scene=self._scene)
 
     def _act(self, given: CycleInputs) -> None:
-        """A policy step every `_turns` cycles; if its targets are held, the robot damps."""
-        if self._turn == 0:
-            measured = replace(self.sensors.measured, **given.wanted.seen)
-            targets = self.controller.step(measured, given.wanted.command, measured_at=self.sensors.at)
-            if targets.held[0]:
-                self._enter(State.DAMPING, given, targets.reasons[0])
-                return
-            self._target = targets.position[0]
-        self._turn = (self._turn + 1) % self._turns
+        """A policy step when one is due; if it is late or its targets are held, the robot damps.
+
+        The first step has the command of the standing posture, from which later ones approach the operator's.
+        """
+        first, now = self._due is None, given.now
+        due = now if self._due is None else self._due
+        if now < due - 0.5 / FREQUENCY:
+            return
+        if (late := now - due) > self.limits.overrun:
+            self._enter(State.DAMPING, given, f"policy step overrun: {1e3 * late:.1f} ms late")
+            return
+        self._due = due + self._period
+        measured = replace(self.sensors.measured, **given.wanted.seen)
+        command = self._standing if first else given.wanted.command
+        targets = self.controller.step(measured, command, measured_at=self.sensors.at)
+        if targets.held[0]:
+            self._enter(State.DAMPING, given, targets.reasons[0])
+            return
+        self._target = targets.position[0]
 
     def _command(self, now: float) -> Record:
         command = messages.empty(messages.LOW_COMMAND)

@@ -36,6 +36,9 @@ STEPS = {"i": (0, 0.1), "k": (0, -0.1), "j": (1, 0.05), "l": (1, -0.05), "u": (Y
 STEPS |= {"r": (HEIGHT, 0.02), "f": (HEIGHT, -0.02), "t": (PITCH, 0.1), "g": (PITCH, -0.1)}
 """Index of a command entry and step of each key [m/s, rad/s, m, rad]."""
 LARGEST_DATAGRAM = 8192
+UNATTENDED = 5.0
+"""Longest time without a key for which the keyboard's velocity is kept [s]: a connection that froze sends none."""
+ESCAPE = "\x1b"
 
 
 class Operator(Protocol):
@@ -58,6 +61,9 @@ class Ranges:
         self._high[OFFSET] = np.tile(np.add(known.common_offset, known.single_offset), 2)
         self._low[OFFSET] = -self._high[OFFSET]
         self.standing = nominal_command(known)
+        ports, of_object = contract.inputs, quantities(of_object=True)
+        self.seen = {port.name: port.shape[0] for port in ports if port.name in of_object}
+        """Sizes of the object's measurements that the controller observes, by name."""
 
     def clipped(self, command: Array) -> Array:
         """The command within the ranges, (11,)."""
@@ -99,22 +105,49 @@ class Remote:
 
 class Keyboard:
     """Keys of this terminal: 1 damping, 2 stand, 3 run, 0 zero torque, space damping; i k j l u o velocity, r f height,
-    t g torso pitch, x stops."""
+    t g torso pitch, x stops. Escape damps, and so does a terminal that is gone. Without a key for `UNATTENDED` the
+    velocity returns to zero."""
 
     def __init__(self, ranges: Ranges) -> None:
-        self._ranges, self._command = ranges, ranges.standing.copy()
+        self._ranges, self._command, self._pressed = ranges, ranges.standing.copy(), 0.0
+        self._sequence = ""
+        """The beginning of an escape sequence, as function keys send them; such keys mean nothing."""
 
     def wanted(self, now: float, state: Record | None) -> OperatorRequest:
-        request = None
-        while select.select([sys.stdin], [], [], 0.0)[0] and (key := os.read(sys.stdin.fileno(), 1).decode("latin-1")):
+        request, keys = None, self._keys()
+        for key in filter(self._single, keys or ""):
             request = State.DAMPING if request is State.DAMPING else KEYS.get(key, request)
             if key in STEPS:
                 place, step = STEPS[key]
                 self._command[place] += step
             elif key == "x":
                 self._command[:HEIGHT] = 0.0
+        if keys is None or self._sequence == ESCAPE:
+            request = State.DAMPING
+        self._pressed = now if keys else self._pressed
+        if now - self._pressed > UNATTENDED:
+            self._command[:HEIGHT] = 0.0
         self._command = self._ranges.clipped(self._command)
         return OperatorRequest(self._command.copy(), now, request)
+
+    def _keys(self) -> str | None:
+        """Keys pressed since the last call; None if the terminal is gone."""
+        try:
+            if not select.select([sys.stdin], [], [], 0.0)[0]:
+                return ""
+            return os.read(sys.stdin.fileno(), LARGEST_DATAGRAM).decode("latin-1") or None
+        except (OSError, ValueError):
+            return None
+
+    def _single(self, key: str) -> bool:
+        """True for a key of its own, False for a character of an escape sequence, which a space or `@` to `~` ends."""
+        begun, self._sequence = self._sequence, ""
+        if key == ESCAPE or (begun == ESCAPE and key in "[O"):
+            self._sequence = key if key == ESCAPE else begun + key
+            return False
+        inside = len(begun) > 1 and key != " "
+        self._sequence = begun if inside and not "@" <= key <= "~" else ""
+        return not inside
 
 
 @contextlib.contextmanager
@@ -156,7 +189,7 @@ class Udp:
     """JSON datagrams at a local port; see `Datagram`. Datagrams that cannot be parsed are ignored."""
 
     def __init__(self, ranges: Ranges, port: int) -> None:
-        self._ranges = ranges
+        self.ranges = ranges
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
             self._socket.bind(("127.0.0.1", port))
@@ -182,14 +215,15 @@ class Udp:
         self._socket.close()
 
     def _given(self, given: Datagram, now: float) -> OperatorRequest:
-        command = self._ranges.standing.copy()
+        command = self.ranges.standing.copy()
         command[:HEIGHT] = *given.velocity, given.yaw_rate
         for place, value in ((HEIGHT, given.height), (PITCH, given.pitch)):
             command[place] = command[place] if value is None else value
         command[OFFSET] = given.wrists
-        command = np.where(np.isfinite(command), self._ranges.clipped(command), self._ranges.standing)
-        known = quantities(of_object=True)
-        seen: dict[str, Any] = {name: np.array([given.seen[name]]) for name in known if name in given.seen}
+        command = np.where(np.isfinite(command), self.ranges.clipped(command), self.ranges.standing)
+        sizes = {name: len(values) for name, values in given.seen.items()}
+        known = self.ranges.seen.items() & sizes.items()  # a measurement of another size is ignored
+        seen: dict[str, Any] = {name: np.array([given.seen[name]]) for name, _ in known}
         return OperatorRequest(command, now, None, seen or self._wanted.seen, now if seen else self._wanted.seen_at)
 
 

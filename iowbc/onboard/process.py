@@ -1,12 +1,15 @@
 """Process that drives a robot: checks, then a loop from states to commands, timed and logged."""
 
+import contextlib
 import ctypes
 import gc
 import os
+import queue
+import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
@@ -91,15 +94,15 @@ class Times:
         return "; ".join([f"{len(self.late)} turns", *parts])
 
 
-def listen(bus: "DdsBus", seconds: float) -> BusSnapshot:
-    """Receives messages for some time [s] from the first state on."""
+def listen(bus: "DdsBus", seconds: float, stopped: Callable[[], bool] = lambda: False) -> BusSnapshot:
+    """Receives messages for some time [s] from the first state on, or until `stopped`."""
     states: list[Record] = []
     battery: Record | None = None
     others = 0
     if not bus.wait(messages.LOW_STATE, DISCOVERY):
         return BusSnapshot([], DISCOVERY, None, 0, None)
     begin = time.monotonic()
-    while (spent := time.monotonic() - begin) < seconds:
+    while (spent := time.monotonic() - begin) < seconds and not stopped():
         bus.wait(messages.LOW_STATE, 0.01)
         states += bus.take(messages.LOW_STATE)
         others += len(bus.take(messages.LOW_COMMAND))
@@ -132,7 +135,51 @@ def drive(
     tell: Callable[[str], None] = print,
     stopped: Callable[[], bool] = lambda: False,
 ) -> Times:
-    """Drives the robot until `stopped` or for some time [s], and damps it at the end."""
+    """Drives the robot until `stopped` or for some time [s], and damps it at the end, also after an error."""
+    with Teller(tell) as teller:
+        try:
+            return _driven(bus, machine, operator, clock, seconds, log, teller.put, stopped)
+        except BaseException:
+            for _ in range(round(FINAL_DAMPING / PERIOD)):
+                bus.publish(machine.damp())
+                time.sleep(PERIOD)
+            raise
+
+
+class Teller:
+    """Tells lines in a thread of its own, so that a terminal that blocks or is gone neither delays nor ends a loop."""
+
+    def __init__(self, tell: Callable[[str], None]) -> None:
+        self._tell, self._lines = tell, queue.SimpleQueue[str | None]()
+        self._thread = threading.Thread(target=self._run, name="teller", daemon=True)
+        self._thread.start()
+
+    def put(self, line: str) -> None:
+        self._lines.put(line)
+
+    def _run(self) -> None:
+        with contextlib.suppress(OSError):
+            while (line := self._lines.get()) is not None:
+                self._tell(line)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self._lines.put(None)
+        self._thread.join(FINAL_DAMPING)
+
+
+def _driven(
+    bus: "DdsBus",
+    machine: Machine,
+    operator: Operator,
+    clock: Clock,
+    seconds: float,
+    log: LogWriter | None,
+    tell: Callable[[str], None],
+    stopped: Callable[[], bool],
+) -> Times:
     kept = np.full((2, KEPT_TIMES), np.nan, np.float32)  # allocated in advance
     turns = 0
     begin: float | None = None
@@ -156,8 +203,9 @@ def drive(
             tell(f"{now - begin:8.3f} s  {event}")
             if log is not None:
                 log.add("event", now, text=event, state=machine.state)
-        if log is not None:
-            log.turn(given, command)
+        if log is not None and not log.turn(given, command):
+            tell(f"{now - begin:8.3f} s  log: {log.failure}; nothing more is logged")
+            log = None
         kept[:, turns % KEPT_TIMES] = clock.late, time.perf_counter() - started
         turns += 1
         if leaving is not None and now - leaving >= FINAL_DAMPING:

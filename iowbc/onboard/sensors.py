@@ -9,6 +9,8 @@ from iowbc.control.sensors import Measured
 from iowbc.onboard.messages import Record
 from iowbc.robot import rotations
 
+SILENCE = 1.0
+"""Time without a new state after which the robot may have restarted [s]; a robot that moved is damped long before."""
 CLOCK_DRIFT = 2e-4
 """Clock drift between the robot and this machine that does not count as delay [s/s]."""
 
@@ -63,6 +65,8 @@ class Sensors:
         self.state: Record | None = None
         self.posture: MeasuredState | None = None
         self.heading = 0.0
+        self._yaw: float | None = None
+        """Last heading within ±π that was finite [rad]."""
         self.at = -np.inf
         """Arrival time of the newest state [s]."""
         self.late = 0.0
@@ -72,26 +76,28 @@ class Sensors:
     def take(self, states: tuple[Record, ...], now: float) -> None:
         """Processes the states that arrived, oldest first, at `now` [s]."""
         for state in states:
-            if self._repeated(state):
+            if self._repeated(state, now):
                 continue
+            if self.state is not None and state["tick"] < self.state["tick"]:
+                self._least = np.inf
             found = posture(state, self._joints)
-            if self.posture is not None:
-                turned = (found.yaw - self.posture.yaw + np.pi) % (2.0 * np.pi) - np.pi
-                self.heading += float(turned) if np.isfinite(turned) else 0.0
-            else:
-                self.heading = found.yaw
+            if np.isfinite(found.yaw):
+                last, self._yaw = self._yaw, found.yaw
+                turned = found.yaw if last is None else (found.yaw - last + np.pi) % (2.0 * np.pi) - np.pi
+                self.heading += float(turned)
             self.state, self.posture, self.at = state, found, now
             offset = now - 1e-3 * float(state["tick"])
             self._least = min(self._least + CLOCK_DRIFT * (now - self._least_at), offset)
             self._least_at, self.late = now, offset - self._least
 
-    def _repeated(self, state: Record) -> bool:
-        """True for a state that is no newer than the last or has identical values, since sensors have noise."""
+    def _repeated(self, state: Record, now: float) -> bool:
+        """True for a state that is no newer than the last or has identical values, since sensors have noise. After
+        `SILENCE` the robot's clock may begin anew."""
         last = self.state
         if last is None:
             return False
         frozen = last["imu_state"] == state["imu_state"] and (last["motor_state"] == state["motor_state"]).all()
-        return bool(state["tick"] <= last["tick"] or frozen)
+        return bool((state["tick"] <= last["tick"] and now - self.at < SILENCE) or frozen)
 
     @property
     def measured(self) -> Measured:

@@ -105,6 +105,8 @@ def test_a_generator_that_is_not_what_its_name_says_is_named_by_the_simulation(
         {"physics_frequency": 0},
         {"history": 0},
         {"kp": [1e999] * 29},
+        {"kp": [300.0] * 29},
+        {"control_frequency": 100.0},
         {"kp": [-1.0] * 29},
         {"upper": [-9.0] * 29},
         {"inputs": []},

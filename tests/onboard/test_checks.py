@@ -27,7 +27,9 @@ def heard(still: Still, change: Callable[[Record], None] = lambda state: None) -
 
 
 def failed(still: Still, listened: BusSnapshot) -> list[str]:
-    return [check.name for check in checks(still.controller, listened, still.standing, LIMITS) if not check.passed]
+    return [
+        check.name for check in checks(still.controller, listened, "free", still.standing, LIMITS) if not check.passed
+    ]
 
 
 def test_a_robot_in_order_passes_every_check(still: Still) -> None:
@@ -87,3 +89,14 @@ def test_the_verdicts_are_seen_in_a_narrow_terminal_and_a_waived_failure_passes(
     assert "states FAILED 218 a second" in " ".join(capsys.readouterr().out.split())
     report_checks(Console(width=60), found, ("states",))
     assert "states waived 218 a second" in " ".join(capsys.readouterr().out.split())
+
+
+def test_silence_and_a_robot_with_other_motors_cannot_be_waived(still: Still, monkeypatch: pytest.MonkeyPatch) -> None:
+    listened = heard(still)
+    silent = checks(still.controller, replace(listened, states=[]), "free", still.standing, LIMITS)
+    joints = still.controller.contract.joints[::-1]
+    monkeypatch.setattr(still.controller, "contract", still.controller.contract.model_copy(update={"joints": joints}))
+    other = checks(still.controller, listened, "free", still.standing, LIMITS)
+    for found, name in ((silent, "states"), (other, "model")):
+        with pytest.raises(UsageError, match=rf"^{name}: failed, nothing was sent; put it right$"):
+            report_checks(Console(width=60), found, (name, "battery"))

@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 from still import Still
 
+from iowbc.control.command import HEIGHT, PITCH
 from iowbc.deploy.controller import Controller
 from iowbc.onboard.machine import State
 from iowbc.onboard.messages import Record
+from iowbc.onboard.process import PERIOD
 
 
 def gains(command: Record) -> tuple[float, float]:
@@ -172,8 +174,64 @@ def test_a_warm_motor_is_warned_of_once_after_each_stand(still: Still) -> None:
 def test_a_damped_robot_runs_again_by_way_of_stand(still: Still) -> None:
     still.until(State.RUN)
     still.turn(others=1)
+    still.turn(State.STAND)
+    assert still.machine.events == ["stand refused: second publisher: another program sends low-level commands"]
+    for _ in range(round(still.machine.limits.command_age / PERIOD)):
+        still.turn()
     still.until(State.RUN)
     assert still.machine.state is State.RUN
+
+
+def test_run_begins_where_stand_ends_whatever_is_commanded_by_then(still: Still) -> None:
+    still.until(State.STAND)
+    before_height, still.standing = still.standing[HEIGHT], still.standing.copy()
+    still.standing[[0, HEIGHT, PITCH]] = 0.6, 0.5, 0.9
+    before, legs = still.turn(), slice(0, 12)
+    first = still.turn(State.RUN)
+    assert still.machine.state is State.RUN
+    moved = np.abs(first["motor_cmd"]["q"] - before["motor_cmd"]["q"])[legs]
+    assert moved.max() < 0.3
+    assert still.controller.state["command"][0, HEIGHT] == pytest.approx(before_height)
+    for _ in range(round(0.1 / PERIOD)):
+        still.turn()
+    command = still.controller.state["command"][0]
+    assert 0.0 < command[0] < 0.2
+    assert 0.5 < command[HEIGHT] < before_height
+
+
+def test_a_slow_loop_keeps_the_rate_of_the_policy_or_damps(still: Still) -> None:
+    still.until(State.RUN)
+    steps, begin = set(), still.now
+    for _ in range(60):
+        still.turns += 3  # turns of 8 ms
+        still.turn()
+        steps.add(still.controller.state["phase"].tobytes() + still.controller.state["history"].tobytes())
+    assert still.machine.state is State.RUN, still.machine.events
+    assert len(steps) == pytest.approx((still.now - begin) * still.controller.frequency, abs=2)
+
+
+def test_a_robot_that_restarts_is_followed_again_and_one_wrong_tick_is_forgotten(still: Still) -> None:
+    still.until(State.RUN)
+    still.turns += 1
+    later = still.state()
+    later["tick"] = 4_000_000_000
+    still.turn(states=(later,))
+    for _ in range(round(0.02 / PERIOD)):
+        still.turn()
+    assert still.machine.state is State.DAMPING
+    still.turns += round(1.0 / PERIOD)
+    for _ in range(10):
+        still.turn()
+    still.until(State.RUN)
+    assert still.machine.state is State.RUN
+
+
+def test_the_heading_counts_from_the_first_that_is_a_number(still: Still) -> None:
+    state = still.state()
+    state["imu_state"]["quaternion"] = 0.0
+    still.turn(states=(state,))
+    still.until(State.RUN)
+    assert still.machine.sensors.heading == 0.0
 
 
 def test_a_policy_that_observes_the_object_does_not_run_without_its_pose(sighted: Path) -> None:

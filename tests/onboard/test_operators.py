@@ -1,8 +1,12 @@
 """Commands of the remote and of UDP."""
 
+import contextlib
 import json
+import os
 import socket
 import struct
+import sys
+import tty
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -15,7 +19,17 @@ from iowbc.errors import UsageError
 from iowbc.onboard import messages
 from iowbc.onboard.machine import State
 from iowbc.onboard.messages import Record
-from iowbc.onboard.operators import BUTTONS, OperatorWithPoses, Ranges, Remote, Udp, object_poses, operator
+from iowbc.onboard.operators import (
+    BUTTONS,
+    UNATTENDED,
+    Keyboard,
+    OperatorWithPoses,
+    Ranges,
+    Remote,
+    Udp,
+    object_poses,
+    operator,
+)
 
 
 @pytest.fixture
@@ -56,6 +70,60 @@ def test_a_button_asks_once_and_damping_as_long_as_it_is_held(ranges: Ranges) ->
 
 
 @pytest.fixture
+def terminal(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
+    """The far end of a terminal that is the standard input."""
+    far, near = os.openpty()
+    tty.setcbreak(near)
+    with open(near, encoding="utf-8") as standard_input:
+        monkeypatch.setattr(sys, "stdin", standard_input)
+        yield far
+        with contextlib.suppress(OSError):
+            os.close(far)
+
+
+F9, INSERT, DELETE, F1, CTRL_RIGHT = b"\x1b[20~", b"\x1b[2~", b"\x1b[3~", b"\x1bOP", b"\x1b[1;5C"
+
+
+def pressed(keyboard: Keyboard, terminal: int, keys: bytes, now: float = 0.0) -> State | None:
+    os.write(terminal, keys)
+    return keyboard.wanted(now, None).request
+
+
+def test_keys_command_and_function_keys_mean_nothing(ranges: Ranges, terminal: int) -> None:
+    keyboard = Keyboard(ranges)
+    assert [pressed(keyboard, terminal, key) for key in (F9, INSERT, DELETE, F1, CTRL_RIGHT)] == [None] * 5
+    assert pressed(keyboard, terminal, b"i") is None
+    assert keyboard.wanted(0.1, None).command[0] == pytest.approx(0.1)
+    assert pressed(keyboard, terminal, b"2") is State.STAND
+    assert pressed(keyboard, terminal, F9 + b"3") is State.RUN
+
+
+def test_escape_damps_and_a_sequence_that_is_cut_requests_nothing_else(ranges: Ranges, terminal: int) -> None:
+    keyboard = Keyboard(ranges)
+    assert pressed(keyboard, terminal, b"\x1b") is State.DAMPING
+    assert pressed(keyboard, terminal, b"[2~") is None
+    assert pressed(keyboard, terminal, b"\x1b[") is None
+    assert pressed(keyboard, terminal, b" ") is State.DAMPING
+    assert pressed(keyboard, terminal, b"3") is State.RUN
+
+
+def test_an_unattended_keyboard_stops_and_a_terminal_that_is_gone_damps(ranges: Ranges, terminal: int) -> None:
+    keyboard = Keyboard(ranges)
+    pressed(keyboard, terminal, b"ii", now=1.0)
+    assert keyboard.wanted(1.0 + UNATTENDED, None).command[0] > 0.0
+    assert not keyboard.wanted(1.1 + UNATTENDED, None).command[:HEIGHT].any()
+    os.close(terminal)
+    assert keyboard.wanted(2.0, None).request is State.DAMPING
+
+
+def test_a_measurement_of_another_size_is_ignored(sighted: Path) -> None:
+    source = Udp(Ranges(read_contract(sighted)), 0)
+    send(source, json.dumps({"seen": {"object_position": [0.3, 0.0], "object_quaternion": [1, 0, 0, 0]}}).encode())
+    assert source.wanted(0.0, None).seen.keys() == {"object_quaternion"}
+    source.close()
+
+
+@pytest.fixture
 def source(ranges: Ranges) -> Iterator[Udp]:
     made = Udp(ranges, 0)
     yield made
@@ -89,7 +157,8 @@ def test_damping_wins_over_requests_that_follow_it(source: Udp) -> None:
     assert source.wanted(0.0, None).request is State.DAMPING
 
 
-def test_object_poses_of_another_source_leave_the_command_alone(ranges: Ranges, source: Udp) -> None:
+def test_object_poses_of_another_source_leave_the_command_alone(sighted: Path, source: Udp) -> None:
+    ranges = source.ranges = Ranges(read_contract(sighted))
     both = OperatorWithPoses(Remote(ranges), source)
     pose = {"object_position": [0.3, 0.0, 0.1]}
     send(source, json.dumps({"velocity": [0.2, 0.0], "request": "run", "seen": pose}).encode())

@@ -2,7 +2,7 @@
 
 import shutil
 from contextlib import closing
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -129,6 +129,30 @@ def test_measurements_that_are_no_numbers_leave_the_command(folder: Path, contro
     assert np.isfinite(standing).all()
     with pytest.raises(ValueError, match="this skill observes the object"):
         Skill.load(folder, controller).step(Measured(**some | {"object_position": None}))
+
+
+@pytest.mark.parametrize(("name", "value"), [("joint_position", 57.0), ("joint_velocity", np.nan)])
+def test_one_bad_sample_does_not_change_what_the_skill_commands(
+    folder: Path, recipe: Recipe, controller: Controller, name: str, value: float
+) -> None:
+    with closing(game_of(recipe, controller)) as game:
+        game.reset()
+        measured = copied(game.batch.lower.simulation.measured)
+    commands = []
+    for bad in (False, True):
+        controller.reset(scene="lift")
+        skill, steps = Skill.load(folder, controller), 30
+        noise = 1e-3 * np.random.default_rng(0).standard_normal((steps, 29))
+        for step in range(steps):
+            now = replace(measured, joint_position=measured.joint_position + noise[step])
+            if bad and step == steps // 2:
+                values = getattr(now, name).copy()
+                values[0, 20] = value
+                now = replace(now, **{name: values})
+            command = skill.step(now)
+            controller.step(now, command)
+        commands.append(command)
+    np.testing.assert_allclose(commands[1], commands[0], atol=0.02)
 
 
 @pytest.mark.parametrize("name", [GRAPH, GOLDEN])

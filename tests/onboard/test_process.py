@@ -1,0 +1,82 @@
+"""The loop damps the robot however it ends, and neither a terminal nor a log can delay or end it."""
+
+import errno
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from still import Still
+
+from iowbc.onboard.log import LogWriter
+from iowbc.onboard.machine import OperatorRequest, State
+from iowbc.onboard.messages import Record
+from iowbc.onboard.process import FINAL_DAMPING, PERIOD, LockStep, drive
+
+
+class Bus:
+    """A bus with a robot that stands, and the commands that it received."""
+
+    def __init__(self, still: Still) -> None:
+        self.still, self.commands = still, list[Record]()
+
+    def publish(self, command: Record) -> None:
+        self.commands.append(command)
+
+    def wait(self, kind: Any, seconds: float) -> bool:
+        self.still.turns += 1
+        return True
+
+    def take(self, kind: Any) -> list[Record]:
+        return [self.still.state()] if "motor_state" in (kind.names or ()) else []
+
+
+class Operator:
+    """Runs the robot, and then fails."""
+
+    def __init__(self, still: Still, fails_after: int) -> None:
+        self.still, self.fails_after, self.turns = still, fails_after, 0
+
+    def wanted(self, now: float, state: Record | None) -> OperatorRequest:
+        self.turns += 1
+        if self.turns > self.fails_after:
+            raise ValueError("no command")
+        order = {1: State.DAMPING, 2: State.STAND, 80: State.RUN}
+        return OperatorRequest(self.still.standing, now, order.get(self.turns))
+
+
+def driven(still: Still, turns: int, **options: Any) -> Bus:
+    bus: Any = Bus(still)
+    with pytest.raises(ValueError, match="no command"):
+        drive(bus, still.machine, Operator(still, turns), LockStep(), **options)
+    return bus  # type: ignore[no-any-return]
+
+
+def test_an_error_in_the_loop_damps_a_running_robot_before_it_ends(still: Still) -> None:
+    commands = driven(still, 100, tell=lambda text: None).commands
+    assert (commands[99]["motor_cmd"]["kp"][:29] > 0.0).all()
+    assert len(commands) == 100 + round(FINAL_DAMPING / PERIOD)
+    assert not any(command["motor_cmd"]["kp"].any() for command in commands[100:])
+    assert (commands[-1]["motor_cmd"]["kd"][:29] > 0.0).all()
+
+
+def test_a_terminal_that_is_gone_does_not_end_the_loop(still: Still) -> None:
+    def gone(text: str) -> None:
+        raise BrokenPipeError
+
+    assert (driven(still, 100, tell=gone).commands[99]["motor_cmd"]["kp"][:29] > 0.0).all()
+
+
+def test_a_full_disk_ends_the_log_alone(still: Still, tmp_path: Path) -> None:
+    told: list[str] = []
+    with LogWriter(tmp_path / "log.mcap", {}) as log:
+
+        def full(*_: Any) -> None:
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+        log._writer = SimpleNamespace(add_message=full)  # type: ignore[assignment]
+        commands = driven(still, 400, tell=told.append, log=log).commands
+    assert (commands[399]["motor_cmd"]["kp"][:29] > 0.0).all()
+    assert sum("log: No space left on device; nothing more is logged" in line for line in told) == 1
+    assert np.isfinite(commands[-1]["motor_cmd"]["kd"]).all()
