@@ -314,6 +314,16 @@ def test_ten_masses_in_the_same_five_worlds_are_five_worlds() -> None:
     assert row["success_p"] == pytest.approx(2 * 0.5**5), "of fifty pairs it would be 2e-15"
 
 
+def test_a_comparison_names_what_was_drawn_from_other_ranges() -> None:
+    trials = [trials_of(name, "lifting", {4.0: 5}).assign(drawn_kp_scale=1.0) for name in ("IO-WBC", "WBC")]
+    for latency, said in ((1.0, False), (1.5, True)):
+        trials[1] = trials[1].assign(drawn_action_latency=latency, drawn_object_mass_scale=latency)
+        trials[0] = trials[0].assign(drawn_action_latency=1.0, drawn_object_mass_scale=1.0)
+        table = difference_table(pd.concat(trials))
+        assert table is not None
+        assert ("WBC and IO-WBC met different worlds (action latency)." in table.caption) is said
+
+
 def test_the_largest_push_survived_is_told_by_direction() -> None:
     levels = {10.0: 5, 20.0: 4, 30.0: 1}
     parts = [trials_of("IO-WBC", "pushes", {4.0: n}, "left", impulse=size) for size, n in levels.items()]

@@ -11,17 +11,31 @@ from iowbc.evaluation.trials.errors import ERRORS
 from iowbc.results.table import ABSENT, Column, Table, heads, measured
 
 PAIR = ["suite", "case", "mass", "impulse", "trial", "training"]
-"""Columns that identify a pair: trials in the same world with the same commands. Trainings are paired in order, the
-first of a variant with the first of the other."""
+"""Columns that identify a pair: trials with the same seed and commands. Trainings are paired in order, the first of a
+variant with the first of the other."""
+DRAWN = "drawn_"
+"""Beginning of the columns with drawn quantities, which are equal in a pair if both recipes have the same world."""
+WITHOUT_EFFECT = ("object_mass_scale",)
+"""Drawn quantities that have no effect in trials, whose masses are given."""
 
 
 def paired(trials: pd.DataFrame, variant: str, reference: str) -> pd.DataFrame:
     """Paired trials of two variants, with column suffixes `_variant` and `_reference`."""
     trials = with_trainings(trials)
     places = trials.groupby("variant")[TRAINING].transform(lambda seeds: pd.factorize(seeds)[0])
-    trials = trials.assign(training=places)[["variant", *PAIR, "survived", "succeeded", *ERRORS]]
+    drawn = [name for name in trials.select_dtypes("number") if name.startswith(DRAWN)]
+    trials = trials.assign(training=places)[["variant", *PAIR, "survived", "succeeded", *ERRORS, *drawn]]
     own, other = (trials[trials["variant"] == name].drop(columns="variant") for name in (variant, reference))
     return own.merge(other, on=PAIR, suffixes=("_variant", "_reference"), validate="one_to_one")
+
+
+def drawn_apart(pairs: pd.DataFrame) -> list[str]:
+    """Drawn quantities that differ within paired trials, because the variants' recipes have other worlds."""
+    names = [name.removesuffix("_variant") for name in pairs if name.startswith(DRAWN) and name.endswith("_variant")]
+    own, other = (pairs[[f"{name}_{side}" for name in names]].to_numpy() for side in ("variant", "reference"))
+    apart = ~np.isclose(own, other, equal_nan=True).all(axis=0)
+    found = (name.removeprefix(DRAWN) for name, differs in zip(names, apart, strict=True) if differs)
+    return [name.replace("_", " ") for name in found if name not in WITHOUT_EFFECT]
 
 
 def mean_difference(values: pd.Series, worlds: pd.Series) -> tuple[float, float, float]:
@@ -44,6 +58,12 @@ def difference_table(trials: pd.DataFrame) -> Table | None:
     """Differences of each variant to the first, over all masses of each suite; None if there are no pairs."""
     reference, *others = variants_of(trials)
     rows, numbers = [], []
+    apart = {variant: drawn_apart(paired(trials, variant, reference)) for variant in others}
+    worlds = "".join(
+        f" {variant} and {reference} met different worlds ({', '.join(names)})."
+        for variant, names in apart.items()
+        if names
+    )
 
     def add(suite: str, variant: str, errors: pd.DataFrame, last: str, **figures: object) -> None:
         """Add a row of error differences; `errors` also holds the world of each."""
@@ -72,9 +92,9 @@ def difference_table(trials: pd.DataFrame) -> Table | None:
     if not rows:
         return None
     caption = (
-        f"Differences to {reference} in pairs of trials that met the same world and commands, over all masses of a "
-        "suite: errors where both survived, with their 95 % interval and Student's p; success with an exact p. Both "
-        "take the worlds as clusters, in each of which all masses and trainings stand or fall together. "
+        f"Differences to {reference} in pairs of trials with the same seed and commands, over all masses of a "
+        f"suite.{worlds} Errors where both survived, with their 95 % interval and Student's p; success with an exact "
+        "p. Both take the worlds as clusters, in each of which all masses and trainings stand or fall together. "
         f"Negative errors are better. No p is corrected for how many there are. {STANDS_STILL}: what doing nothing "
         f"scores, from the script, against the trials that {reference} survived. {in_common(trials)}"
     )
