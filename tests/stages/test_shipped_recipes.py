@@ -22,21 +22,6 @@ RECIPES = Path(__file__).parents[2] / "recipes"
 VARIANTS = {
     "wbc": {
         "stages",
-        "simulation.randomization.enabled",
-        "simulation.partner.enabled",
-        "simulation.impulses.enabled",
-        "task.scenes.free",
-        "task.scenes.lift",
-        "task.scenes.push",
-        "task.scenes.tyre",
-        "task.observation.observe_object",
-        "task.reward.object.position",
-        "task.reward.object.orientation",
-        "task.reward.object.vertical_velocity",
-        "eval.simulation",
-    },
-    "wbc_fair": {
-        "stages",
         *(f"simulation.scenes.{name}_arms" for name in ("lift", "tyre", "push")),
         *(f"task.scenes.{name}" for name in ("lift", "tyre", "push", "lift_arms", "tyre_arms", "push_arms")),
         *(f"task.references.{kind}.{name}_arms" for kind in ("grasps", "loads") for name in ("lift", "tyre", "push")),
@@ -118,23 +103,23 @@ def test_a_variant_is_evaluated_in_the_world_where_iowbc_was_trained(name: str) 
     assert trial_world(recipe(name)) == trial_world(recipe("full"))
 
 
-def test_the_fair_load_agnostic_controller_never_meets_an_object_in_training() -> None:
-    fair = recipe("wbc_fair")
-    played = {name: getattr(fair.simulation.scenes, name) for name, share in fair.task.scenes if share > 0}
+def test_the_load_agnostic_controller_never_meets_an_object_in_training() -> None:
+    agnostic = recipe("wbc")
+    played = {name: getattr(agnostic.simulation.scenes, name) for name, share in agnostic.task.scenes if share > 0}
     assert {scene.object for scene in played.values()} == {None}
-    assert not fair.task.observation.observe_object
-    weights = fair.task.reward.object
+    assert not agnostic.task.observation.observe_object
+    weights = agnostic.task.reward.object
     assert (weights.position, weights.orientation, weights.vertical_velocity, weights.beside) == (0, 0, 0, 0)
 
 
-def test_the_fair_load_agnostic_controller_practises_the_arms_of_every_grasp_as_often_as_iowbc() -> None:
+def test_the_load_agnostic_controller_practises_the_arms_of_every_grasp_as_often_as_iowbc() -> None:
     shares = {}
-    for name in ("wbc_fair", "full"):
+    for name in ("wbc", "full"):
         task = recipe(name).task
         grasps = dict(task.references.grasps)
         played = [(grasps[scene], share) for scene, share in task.scenes if share > 0]
         shares[name] = {grasp: sum(share for own, share in played if own == grasp) for grasp, _ in played}
-    assert shares["wbc_fair"] == shares["full"]
+    assert shares["wbc"] == shares["full"]
 
 
 ABLATIONS = {

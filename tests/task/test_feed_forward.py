@@ -36,19 +36,19 @@ def arm_targets(recipe: Recipe, folder: Path, robot: Robot, scene: str) -> Any:
 
 
 @pytest.mark.parametrize(("trained", "played"), [(one, scene) for one, scenes in PLAYED_AS.items() for scene in scenes])
-def test_the_fair_baselines_arms_expect_in_trials_what_they_did_in_training(
+def test_the_load_agnostic_baselines_arms_expect_in_trials_what_they_did_in_training(
     folder: Path, robot: Robot, trained: str, played: str
 ) -> None:
-    fair = load_recipe(RECIPES / "wbc_fair.yaml").recipe
-    in_training = arm_targets(fair, folder, robot, trained)
-    np.testing.assert_array_equal(arm_targets(fair, folder, robot, played), in_training)
-    expecting = with_changes(fair, {f"task.references.loads.{played}": 3.5})
+    agnostic = load_recipe(RECIPES / "wbc.yaml").recipe
+    in_training = arm_targets(agnostic, folder, robot, trained)
+    np.testing.assert_array_equal(arm_targets(agnostic, folder, robot, played), in_training)
+    expecting = with_changes(agnostic, {f"task.references.loads.{played}": 3.5})
     assert np.abs(arm_targets(expecting, folder, robot, played) - in_training).max() > 0.02
 
 
-def test_the_fair_baselines_arms_expect_nothing_in_any_scene_of_the_trials(folder: Path) -> None:
-    fair = load_recipe(RECIPES / "wbc_fair.yaml").recipe
-    assert fair.eval.scenes
-    loads = dict(evaluated_world(Specification(fair, folder)).recipe.task.references.loads)
+def test_the_load_agnostic_baselines_arms_expect_nothing_in_any_scene_of_the_trials(folder: Path) -> None:
+    agnostic = load_recipe(RECIPES / "wbc.yaml").recipe
+    assert agnostic.eval.scenes
+    loads = dict(evaluated_world(Specification(agnostic, folder)).recipe.task.references.loads)
     assert {name for name, load in loads.items() if load} == set()
-    assert set(fair.eval.scenes) <= loads.keys()
+    assert set(agnostic.eval.scenes) <= loads.keys()
