@@ -7,6 +7,7 @@ import sys
 import threading
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -25,7 +26,7 @@ from iowbc.twin.robot import low_state
 
 pytest.importorskip("cyclonedds")
 pytest.importorskip("mcap")
-from iowbc.onboard.dds import DdsBus
+from iowbc.onboard.dds import DdsBus, _mode_name
 from iowbc.onboard.log import LogWriter, export_digest, read_cycles, replay
 
 pytestmark = pytest.mark.integration
@@ -78,6 +79,23 @@ def test_the_motion_switcher_answers_that_no_controller_is_active(ends: tuple[Dd
     finally:
         over.set()
         answering.join()
+
+
+@pytest.mark.parametrize(
+    ("code", "data", "name"),
+    [
+        (0, '{"name": ""}', ""),
+        (0, '{"name": "ai"}', "ai"),
+        (7301, '{"name": ""}', None),
+        (0, "{}", None),
+        (0, "", None),
+    ],
+)
+def test_an_answer_of_the_motion_switcher_without_a_name_or_with_an_error_is_none(
+    code: int, data: str, name: str | None
+) -> None:
+    header = SimpleNamespace(status=SimpleNamespace(code=code))
+    assert _mode_name(SimpleNamespace(header=header, data=data)) == name
 
 
 class Rollout:
