@@ -1,6 +1,7 @@
 """`iowbc compare` and `iowbc report`: tables, figures, learning curves and films over several runs."""
 
 import math
+import shutil
 import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -12,7 +13,7 @@ from rich.filesize import decimal
 
 from iowbc.commands import completion, options
 from iowbc.commands.diff import difference_lines
-from iowbc.commands.lookup import FILM, film_of, members_of, named, points_of, record_comparison
+from iowbc.commands.lookup import COMPARISON_RECORD, FILM, film_of, members_of, named, points_of, record_comparison
 from iowbc.commands.printed import film_progress, print_json, shown_path, stdout_console, tell
 from iowbc.commands.results import PROBE, TRIALS, evaluated_actor, split_tables, tables_of
 from iowbc.errors import UsageError
@@ -64,6 +65,9 @@ def compare(
     options.require_extra("train", "iowbc compare")
     require_writable(output, "--output")
     require_whole(store.runs, (run.artifacts["eval"] for run in found if "eval" in run.artifacts))
+    if (output / COMPARISON_RECORD).is_file():  # of an earlier comparison
+        for part in ("tables", "figures"):
+            shutil.rmtree(output / part, ignore_errors=True)
     record_comparison([run.label for run in found], output)
     metrics = metrics_table(grouped(found))
     (output / "metrics.md").write_text(markdown(metrics), encoding="utf-8")

@@ -1,6 +1,7 @@
 """`iowbc export WHAT --web DIR`: an exported controller as a static web page."""
 
 import os
+import shlex
 from functools import partial
 from pathlib import Path
 from typing import Annotated
@@ -52,4 +53,4 @@ def export(
     write_page(exported, folder, store.runs.npm, say)
     whole = sum(path.stat().st_size for path in folder.iterdir())
     say(f"{shown_path(folder)} ({decimal(whole)}): copy it to any web server; to look at it here:")
-    say(f"python3 -m http.server --bind 127.0.0.1 --directory {shown_path(folder)} 8000")
+    say(f"python3 -m http.server --bind 127.0.0.1 --directory {shlex.quote(shown_path(folder))} 8000")

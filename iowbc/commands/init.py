@@ -1,5 +1,6 @@
 """`iowbc init`: recipes and a robot description in a folder of the user's own."""
 
+import shlex
 import shutil
 from pathlib import Path
 from typing import Annotated
@@ -39,7 +40,9 @@ def init(
         with replacing(target) as fresh:
             shutil.copytree(origin, fresh) if origin.is_dir() else shutil.copyfile(origin, fresh)
         tell(console, shown_path(target))
-    console.print(f"to begin: cd {folder}, then `iowbc run quickstart`", highlight=False, soft_wrap=True)
+    console.print(
+        f"to begin: cd {shlex.quote(str(folder))}, then `iowbc run quickstart`", highlight=False, soft_wrap=True
+    )
 
 
 def _content(path: Path) -> dict[str, bytes]:

@@ -86,16 +86,16 @@ def last_used(store: Store, recipe: str) -> dict[str, Artifact]:
 
 
 def _recipe(store: Store, word: str, name: str, published: Mapping[str, Mapping[str, Artifact]]) -> Run:
-    known, shipped = known_recipes(store), published.get(name, {})
-    if name not in known and not shipped:
-        listing = ", ".join(sorted({*known, *published})) or "none"
+    record, shipped = recall(store.runs, name), published.get(name, {})
+    if not record.stages and not shipped:
+        listing = ", ".join(sorted({*known_recipes(store), *published})) or "none"
         raise UsageError(f"recipe {word} has no finished stage in {store.runs.root}; those that have: {listing}")
-    if name not in known:
+    if not record.stages:
         own = [artifact for artifact in shipped.values() if artifact.manifest.recipe == name]
         return Run(word, shipped, own[-1].recipe)
     used = last_used(store, name)
     others = {stage: artifact for stage, artifact in shipped.items() if stage not in used}
-    return Run(word, used, recall(store.runs, name).recipe, others)
+    return Run(word, used, record.recipe, others)
 
 
 def _name_in(word: str) -> str:

@@ -10,8 +10,8 @@ from iowbc.commands.printed import shown_path, stdout_console, tell
 from iowbc.commands.request import Request, planners
 from iowbc.errors import UsageError
 from iowbc.pipeline.stage_plan import Options
+from iowbc.pipeline.store.publishing import LARGEST_REPOSITORY, published_size
 from iowbc.pipeline.store.publishing import publish as copied
-from iowbc.pipeline.store.publishing import published_size
 from iowbc.pipeline.store.runs import Runs, require_writable_runs
 
 
@@ -57,4 +57,8 @@ def publish(
         what = f"{artifact.manifest.stage}: {shown_path(copy.folder)} ({decimal(copy.size)})"
         text = "; ".join([what, *lacks, *notes.get(key, ())])
         tell(console, text)
-    console.print(f"{decimal(published_size(request.runs))} are published in all", highlight=False)
+    size = published_size(request.runs)
+    console.print(f"{decimal(size)} are published in all", highlight=False)
+    if size > LARGEST_REPOSITORY:
+        limit = decimal(LARGEST_REPOSITORY)
+        tell(console, f"warning: a repository should carry no more than {limit}; remove what is out of date")

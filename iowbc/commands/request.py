@@ -43,8 +43,7 @@ class Request:
             value = getattr(replace(self.options, force=frozenset(forced)), one.name)
             values = sorted(value) if isinstance(value, frozenset) else [] if value == one.default else [value]
             words += [word for each in values for word in (f"--{one.name.replace('_', '-')}", str(each))]
-        words += [] if self.runs.root == Path("runs") else ["--runs", str(self.runs.root)]
-        return shlex.join(words)
+        return shlex.join([*words, *self.runs.option])
 
 
 def planners(request: Request) -> list[Planner]:

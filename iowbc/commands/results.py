@@ -85,7 +85,6 @@ def next_commands(runs: Runs, recipe: str, artifacts: Mapping[str, Artifact]) ->
     An artifact of a run with overrides is referred to by key unless an override sets the name, because the recipe's
     name stands for its artifacts without overrides.
     """
-    elsewhere = [] if runs.root == Path("runs") else ["--runs", str(runs.root)]
     overrides = recall(runs, recipe).overrides
     lasting = not overrides or any(override.startswith("name=") for override in overrides)
     own = last_used(Store(runs), recipe) if lasting else {}
@@ -97,7 +96,7 @@ def next_commands(runs: Runs, recipe: str, artifacts: Mapping[str, Artifact]) ->
     policy = next((stage for stage in policy_stages() if stage in artifacts), None)
     seen = [["iowbc", "play", others.get(policy, recipe)]] if policy else [] if others else [["iowbc", "show", recipe]]
     read = ["iowbc", "show", [*others.values()][-1]] if others else ["iowbc", "report", recipe]
-    return [shlex.join([*words, *elsewhere]) for words in (*seen, read)]
+    return [shlex.join([*words, *runs.option]) for words in (*seen, read)]
 
 
 def _print_tables(artifact: Artifact, folder: Path, console: Console) -> None:

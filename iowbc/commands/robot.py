@@ -54,7 +54,7 @@ def robot(
 ) -> None:
     """Check the robot and drive it. Raises UsageError where a check fails."""
     options.require_extra("robot", "iowbc robot")
-    from iowbc.onboard.checks import LIMITS, checks
+    from iowbc.onboard.checks import CHECKS, LIMITS, checks
     from iowbc.onboard.dds import DdsBus
     from iowbc.onboard.log import LogWriter, export_digest
     from iowbc.onboard.machine import Machine
@@ -62,6 +62,8 @@ def robot(
     from iowbc.onboard.process import LockStep, MonotonicClock, drive, enable_realtime, listen
 
     console = stdout_console()
+    for name in waive or ():
+        require_known(name, "check", CHECKS)
     if lockstep and network != "lo":
         raise UsageError("--lockstep is for a simulated robot on this machine (--network lo); a robot does not wait")
     controller = Controller.load(exported_folder(what))
@@ -120,10 +122,6 @@ def _stop_request() -> threading.Event:
 
 def report_checks(console: Console, found: "list[CheckResult]", waived: Collection[str]) -> None:
     """Print the checks. Raises UsageError for failed ones that are not waived, and for those that cannot be."""
-    from iowbc.onboard.checks import CHECKS
-
-    for name in waived:
-        require_known(name, "check", CHECKS)
     table = plain_table("check", "", "found")
     for check in found:
         verdict = "ok" if check.passed else "waived" if check.name in waived and check.waivable else "FAILED"

@@ -1,5 +1,6 @@
 """`iowbc run`: from a recipe file to an exit code, with signals, console and tracking around it."""
 
+import shlex
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
@@ -107,7 +108,7 @@ def compare_variants(request: Request, loaded: Sequence[LoadedRecipe], console: 
     if report != before and loaded[0].recipe.execution.track:
         files = [path for path in sorted(output.rglob("*")) if path.is_file()]
         record_figures(request.runs, f"compare-{name}", {}, report, files)
-    tell(console, f"next:\n  iowbc report {name}")
+    tell(console, f"next:\n  {shlex.join(['iowbc', 'report', name, *request.runs.option])}")
 
 
 def _report_of(folder: Path) -> str:

@@ -1,6 +1,7 @@
 """`iowbc sweep`: runs a recipe with every combination of given values, and reports the results."""
 
 import math
+import shlex
 from collections.abc import Sequence
 from contextlib import nullcontext
 from functools import partial
@@ -209,7 +210,7 @@ def _conclude(
     for path in paths:
         tell(console, shown_path(path))
     if len(finished) > 1:
-        tell(console, f"next:\n  iowbc compare {found.name}")
+        tell(console, f"next:\n  {shlex.join(['iowbc', 'compare', found.name, *runs.option])}")
 
 
 def _tell_rest(asked: Request, endings: Endings, folder: Path, code: int) -> None:

@@ -9,7 +9,7 @@ import queue
 import threading
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, BinaryIO, Self
 
 import numpy as np
 from mcap.reader import NonSeekingReader
@@ -99,9 +99,17 @@ class LogWriter:
             self._file.close()
 
 
+def _opened(path: Path) -> BinaryIO:
+    """A log, to be read. Raises UsageError."""
+    try:
+        return path.open("rb")
+    except OSError as error:
+        raise UsageError(f"{path}: {error.strerror}; name a log of `iowbc robot`") from error
+
+
 def read_about(path: Path) -> dict[str, str]:
-    """Metadata of a log of `iowbc robot`. Raises Damaged."""
-    with path.open("rb") as file:
+    """Metadata of a log of `iowbc robot`. Raises UsageError for a missing file, Damaged for another one."""
+    with _opened(path) as file:
         try:
             about = [entry.metadata for entry in NonSeekingReader(file).iter_metadata() if entry.name == ABOUT]
         except Exception as error:
@@ -116,11 +124,7 @@ def read_messages(path: Path) -> Iterator[tuple[str, float, bytes]]:
 
     Raises UsageError for a missing file, Damaged for one without a message.
     """
-    try:
-        file = path.open("rb")
-    except OSError as error:
-        raise UsageError(f"{path}: {error.strerror}") from error
-    with file:
+    with _opened(path) as file:
         found = False
         try:
             for _, channel, message in NonSeekingReader(file).iter_messages(log_time_order=False):

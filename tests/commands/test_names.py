@@ -100,6 +100,31 @@ def test_a_run_that_has_begun_does_not_hide_what_is_published_until_it_has_its_o
     assert not playable(store, "first", None).published
 
 
+def test_a_run_with_overrides_neither_takes_a_published_name_nor_is_mixed_with_others(
+    folder: Path, command: Command
+) -> None:
+    assert command("publish", "first.yaml").returncode == 0
+    for name in ("store", "recipes", "first", "second"):
+        shutil.rmtree(folder / "runs" / name)
+    store = Store(Runs(folder / "runs"))
+    assert command("run", "first.yaml", "--until", "teacher", "--set", "teacher.steps=9999").returncode == 0
+    assert all(artifact.published for artifact in named(store, "first").artifacts.values())
+    assert [*named(store, "first").artifacts][-1] == "export"
+    assert [path.name.partition("-")[0] for path in (folder / "runs" / "first").glob("teacher*")] == ["teacher"]
+    assert not (folder / "runs" / "first" / "teacher").exists()
+    for words in (("status",), ("ls",), ("show", "first"), ("gc", "--unused", "--dry-run")):
+        assert command(*words).returncode == 0, words
+
+
+def test_a_plain_run_begins_anew_where_one_with_overrides_had_the_name(folder: Path, command: Command) -> None:
+    assert command("run", "second.yaml", "--set", "name=third", "--set", "seed=8").returncode == 0
+    store = Store(Runs(folder / "runs"))
+    assert [*named(store, "third").artifacts][-1] == "export"
+    assert command("run", "second.yaml", "--set", "name=third", "--until", "rg-fit").returncode == 0
+    assert [*named(store, "third").artifacts] == ["rg-dataset", "rg-fit"]
+    assert sorted(path.name for path in (folder / "runs" / "third").iterdir()) == ["rg-dataset", "rg-fit"]
+
+
 def test_the_controller_is_found_by_its_recipes_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     export = tmp_path / "runs" / "mine" / "export"
     export.mkdir(parents=True)

@@ -15,8 +15,8 @@ from pydantic import BaseModel
 from iowbc.errors import Damaged, UsageError
 from iowbc.files import write_whole
 from iowbc.pipeline.console.wording import KEY_LENGTH
-from iowbc.pipeline.store.artifact import RECIPE, Artifact
-from iowbc.pipeline.store.runs import Runs
+from iowbc.pipeline.store.artifact import MANIFEST, RECIPE, Artifact
+from iowbc.pipeline.store.runs import Runs, read_json
 from iowbc.recipe.reading.loading import LoadedRecipe
 
 
@@ -34,7 +34,7 @@ class LastUsed(BaseModel):
     file: str = ""
     overrides: list[str] = []
     recipe: dict[str, Any] = {}
-    """Resolved; empty where it never finished a stage."""
+    """Resolved; empty where its name stands for nothing of its own."""
     stages: dict[str, Use] = {}
     ever: dict[str, float] = {}
     """When it, with any overrides, last used an artifact, by its key [s since 1970]."""
@@ -43,11 +43,17 @@ class LastUsed(BaseModel):
 def remember(runs: Runs, loaded: LoadedRecipe, artifact: Artifact) -> None:
     """Record that a recipe's stage uses this artifact.
 
-    A recipe's name stands for its artifacts without overrides, so a run with overrides only adds to `ever`.
+    A recipe's name stands for its artifacts without overrides. A run with overrides only adds to `ever`, unless nothing
+    else goes by that name; its stages are never mixed with those of other overrides.
     """
     stage, key, name = artifact.manifest.stage, artifact.manifest.key, loaded.recipe.name
     record = _record(runs, name) or LastUsed()
-    if not loaded.overrides or record.overrides or not record.recipe:
+    unnamed = not record.recipe and not _published(runs, name)
+    if not loaded.overrides or record.overrides or unnamed:
+        if record.overrides != list(loaded.overrides):
+            for other in record.stages:
+                (runs.root / name / other).unlink(missing_ok=True)
+            record.stages = {}
         record.file, record.overrides = str(loaded.file), list(loaded.overrides)
         record.recipe = loaded.recipe.model_dump(mode="json")
         record.stages[stage] = Use(key=key, time=time.time())
@@ -89,8 +95,8 @@ def require_whole(runs: Runs, artifacts: Iterable[Artifact]) -> None:
             if record is not None and made.stage in record.stages and record.stages[made.stage].key == made.key:
                 words[-1] = record.file or words[-1]
                 words += [word for override in record.overrides for word in ("--set", override)]
-            words += [] if runs.root == Path("runs") else ["--runs", str(runs.root)]
-            raise UsageError(f"{artifact.folder} is damaged: {error}; to make it anew: {shlex.join(words)}") from None
+            again = shlex.join([*words, *runs.option])
+            raise UsageError(f"{artifact.folder} is damaged: {error}; to make it anew: {again}") from None
 
 
 def named_folder(runs: Runs, recipe: str, stage: str, artifact: Path) -> Path:
@@ -136,4 +142,9 @@ def _record(runs: Runs, recipe: str) -> LastUsed | None:
         record = LastUsed.model_validate_json(record_path(runs, recipe).read_bytes())
     except (OSError, ValueError):
         return None
-    return record if record.recipe else None
+    return record
+
+
+def _published(runs: Runs, recipe: str) -> bool:
+    """True if artifacts of a recipe came with the repository."""
+    return any(read_json(file).get("recipe") == recipe for file in runs.published.glob(f"*/*/{MANIFEST}"))

@@ -4,9 +4,8 @@ import shutil
 from collections.abc import Collection
 from pathlib import Path
 
-from iowbc.errors import UsageError
 from iowbc.files import OLD, replace_folder, restore_folder, synchronise
-from iowbc.pipeline.store.artifact import BESIDE, MANIFEST, Artifact, read_artifact, write_manifest
+from iowbc.pipeline.store.artifact import BESIDE, Artifact, read_artifact, write_manifest
 from iowbc.pipeline.store.locks import lock_path, named_lock
 from iowbc.pipeline.store.runs import Runs
 
@@ -18,6 +17,8 @@ KINDS = frozenset(
 """Endings of files that are published: reading them executes no code."""
 LARGEST_FILE = 12_000_000
 """Maximum size of a published file [bytes]; later stages need only a larger one's digest. Training states fit."""
+NEW = ".new"
+"""Ending of the folder of an unfinished copy."""
 LARGEST_REPOSITORY = 60_000_000
 """Maximum size of all published files [bytes], so that cloning stays fast."""
 
@@ -30,10 +31,13 @@ def publish(runs: Runs, artifact: Artifact, without: Collection[str] = ()) -> Ar
     """
     with named_lock(lock_path(runs, PUBLISHING)):
         for leftover in runs.published.glob("*/.*"):
-            restore_folder(leftover) if leftover.suffix == OLD else shutil.rmtree(leftover)
+            if leftover.suffix == OLD:
+                restore_folder(leftover)
+            elif leftover.suffix == NEW:
+                shutil.rmtree(leftover)
         made = artifact.manifest
         target = runs.published / made.stage / made.key
-        unfinished = target.with_name(f".{made.key}.new")
+        unfinished = target.with_name(f".{made.key}{NEW}")
         omitted = tuple(
             name
             for name, record in made.files.items()
@@ -52,11 +56,5 @@ def publish(runs: Runs, artifact: Artifact, without: Collection[str] = ()) -> Ar
 
 
 def published_size(runs: Runs) -> int:
-    """Size of all published files [bytes]. Raises `UsageError` above `LARGEST_REPOSITORY`."""
-    size = sum(path.stat().st_size for path in runs.published.rglob("*") if path.is_file())
-    if size > LARGEST_REPOSITORY:
-        raise UsageError(
-            f"{runs.published} has {size / 1e6:.0f} MB, more than the {LARGEST_REPOSITORY / 1e6:.0f} MB that a "
-            f"repository should carry; remove what is out of date ({MANIFEST} in each folder says what it is)"
-        )
-    return size
+    """Size of all published files [bytes]."""
+    return sum(path.stat().st_size for path in runs.published.rglob("*") if path.is_file())

@@ -45,6 +45,11 @@ class Runs:
         self.database = root / "mlflow.db"
         """MLflow's embedded database."""
 
+    @property
+    def option(self) -> list[str]:
+        """Words of a command that select this folder; none for the default."""
+        return [] if self.root == Path("runs") else ["--runs", str(self.root)]
+
 
 def read_json(path: Path) -> dict[str, Any]:
     """The object in a JSON file; empty where it is missing, no regular file, not JSON, or holds something else."""

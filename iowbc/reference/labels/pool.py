@@ -114,8 +114,12 @@ def _start_worker(task: LabelTask, key: str) -> _Worker:
     current = context.Value("q", IDLE, lock=False)
     bound = threading.current_thread() is threading.main_thread()
     process = context.Process(target=_work, args=(task, key, theirs, current, os.getpid(), bound), daemon=True)
-    with single_threaded():
-        process.start()
+    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM, signal.SIGHUP})
+    try:
+        with single_threaded():
+            process.start()  # `_work` lifts the mask that it inherits
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
     theirs.close()
     return _Worker(process, ours, current)
 
@@ -161,6 +165,7 @@ def _work(task: LabelTask, key: str, connection: Connection, current: Any, paren
     for ignored in (signal.SIGINT, signal.SIGHUP):
         signal.signal(ignored, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_SETMASK, ())
     die_with_parent(parent, bound=bound)
     number = None
     try:
