@@ -16,6 +16,8 @@ from iowbc.pipeline.store.artifact import Artifact
 
 FOLDED = ("metrics", "finished stages", "used by", "recipe", "point", "why", "found")
 """Columns whose text may go on in the next line."""
+NARROW = 72
+"""Width of a terminal below which every column may fold [characters]."""
 INTERVAL = 10.0
 """Seconds between two lines about a film."""
 PIPE_WIDTH = 160
@@ -30,10 +32,10 @@ def stdout_console() -> Console:
 
 
 def plain_table(*columns: str) -> Table:
-    """An empty table with these columns."""
-    table = Table(box=None, padding=(0, 1, 0, 0))
+    """An empty table with these columns; in a narrow terminal each may fold, so that none is lost."""
+    table, narrow = Table(box=None, padding=(0, 1, 0, 0)), stdout_console().width < NARROW
     for name in columns:
-        table.add_column(name, no_wrap=name not in FOLDED, overflow="fold")
+        table.add_column(name, no_wrap=not narrow and name not in FOLDED, overflow="fold")
     return table
 
 
