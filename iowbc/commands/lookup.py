@@ -12,7 +12,7 @@ from iowbc.errors import UsageError, nearest
 from iowbc.files import write_whole
 from iowbc.pipeline.console.wording import ago
 from iowbc.pipeline.store.artifact import INGREDIENTS, RECIPE, Artifact
-from iowbc.pipeline.store.last_used import recall
+from iowbc.pipeline.store.last_used import LastUsed, recall
 from iowbc.pipeline.store.locks import holder
 from iowbc.pipeline.store.runs import Runs, read_json, read_yaml
 from iowbc.pipeline.store.store import Store
@@ -86,7 +86,8 @@ def last_used(store: Store, recipe: str) -> dict[str, Artifact]:
 
 
 def _recipe(store: Store, word: str, name: str, published: Mapping[str, Mapping[str, Artifact]]) -> Run:
-    record, shipped = recall(store.runs, name), published.get(name, {})
+    record = recall(store.runs, name) if name in known_recipes(store) else LastUsed()
+    shipped = published.get(name, {})
     if not record.stages and not shipped:
         listing = ", ".join(sorted({*known_recipes(store), *published})) or "none"
         raise UsageError(f"recipe {word} has no finished stage in {store.runs.root}; those that have: {listing}")

@@ -44,11 +44,8 @@ class Runs:
         """All of these folders."""
         self.database = root / "mlflow.db"
         """MLflow's embedded database."""
-
-    @property
-    def option(self) -> list[str]:
+        self.option = [] if root == Path("runs") else ["--runs", str(root)]
         """Words of a command that select this folder; none for the default."""
-        return [] if self.root == Path("runs") else ["--runs", str(self.root)]
 
 
 def read_json(path: Path) -> dict[str, Any]:
