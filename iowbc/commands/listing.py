@@ -45,7 +45,7 @@ def status(as_json: options.AsJson = False, runs: options.RunsFolder = options.R
     if recipes:
         table = plain_table("recipe", "finished stages", "last")
         for recipe in recipes:
-            last = max((use.time for use in recall(store.runs, recipe).stages.values()), default=0.0)
+            last = max(ever_used(store.runs, recipe).values(), default=0.0)
             table.add_row(recipe, ", ".join(last_used(store, recipe)), ago(last))
         console.print(table)
     if not (going_on or recipes):

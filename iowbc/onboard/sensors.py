@@ -91,8 +91,8 @@ class Sensors:
             self._least_at, self.late = now, offset - self._least
 
     def _repeated(self, state: Record, now: float) -> bool:
-        """True for a state that is no newer than the last or has identical values, since sensors have noise. After
-        `SILENCE` the robot's clock may begin anew."""
+        """True for a state that is no newer than the last or has identical values, since sensors have noise. An earlier
+        tick is accepted after `SILENCE`, because the robot may have restarted."""
         last = self.state
         if last is None:
             return False

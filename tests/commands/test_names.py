@@ -1,6 +1,7 @@
 """One name means the same in every command and from Python."""
 
 import json
+import re
 import shutil
 import subprocess
 from collections.abc import Callable
@@ -114,6 +115,7 @@ def test_a_run_with_overrides_neither_takes_a_published_name_nor_is_mixed_with_o
     assert not (folder / "runs" / "first" / "teacher").exists()
     for words in (("status",), ("ls",), ("show", "first"), ("gc", "--unused", "--dry-run")):
         assert command(*words).returncode == 0, words
+    assert re.search(r"\nfirst +[\d.]+ \w+ ago *\n$", command("status").stdout), "used, but no stage of its own"
 
 
 def test_a_plain_run_begins_anew_where_one_with_overrides_had_the_name(folder: Path, command: Command) -> None:

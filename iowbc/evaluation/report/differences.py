@@ -58,12 +58,7 @@ def difference_table(trials: pd.DataFrame) -> Table | None:
     """Differences of each variant to the first, over all masses of each suite; None if there are no pairs."""
     reference, *others = variants_of(trials)
     rows, numbers = [], []
-    apart = {variant: drawn_apart(paired(trials, variant, reference)) for variant in others}
-    worlds = "".join(
-        f" {variant} and {reference} met different worlds ({', '.join(names)})."
-        for variant, names in apart.items()
-        if names
-    )
+    apart: dict[str, dict[str, None]] = {variant: {} for variant in others}
 
     def add(suite: str, variant: str, errors: pd.DataFrame, last: str, **figures: object) -> None:
         """Add a row of error differences; `errors` also holds the world of each."""
@@ -78,6 +73,7 @@ def difference_table(trials: pd.DataFrame) -> Table | None:
     for suite, within in trials.groupby("suite", sort=False):
         compared = {variant: pairs for variant in others if len(pairs := paired(within, variant, reference))}
         for variant, pairs in compared.items():
+            apart[variant] |= dict.fromkeys(drawn_apart(pairs))
             both = pairs[pairs["survived_variant"] & pairs["survived_reference"]]
             errors = {name: both[f"{name}_variant"] - both[f"{name}_reference"] for name in ERRORS}
             success = float(pairs["succeeded_variant"].mean() - pairs["succeeded_reference"].mean())
@@ -91,6 +87,11 @@ def difference_table(trials: pd.DataFrame) -> Table | None:
             add(suite, STANDS_STILL, survivors[[WORLD]].assign(**errors), ABSENT)
     if not rows:
         return None
+    worlds = "".join(
+        f" {variant} and {reference} met different worlds ({', '.join(names)})."
+        for variant, names in apart.items()
+        if names
+    )
     caption = (
         f"Differences to {reference} in pairs of trials with the same seed and commands, over all masses of a "
         f"suite.{worlds} Errors where both survived, with their 95 % interval and Student's p; success with an exact "

@@ -48,8 +48,7 @@ def remember(runs: Runs, loaded: LoadedRecipe, artifact: Artifact) -> None:
     """
     stage, key, name = artifact.manifest.stage, artifact.manifest.key, loaded.recipe.name
     record = _record(runs, name) or LastUsed()
-    unnamed = not record.recipe and not _published(runs, name)
-    if not loaded.overrides or record.overrides or unnamed:
+    if not loaded.overrides or record.overrides or not (record.recipe or _published(runs, name)):
         if record.overrides != list(loaded.overrides):
             for other in record.stages:
                 (runs.root / name / other).unlink(missing_ok=True)
