@@ -1,7 +1,6 @@
 """`iowbc bench carry`: evaluation of an external controller on the fixed suite, with a page of results."""
 
 import json
-import os
 import tempfile
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -13,6 +12,7 @@ from iowbc.commands import options
 from iowbc.errors import UsageError
 from iowbc.files import file_digest
 from iowbc.pipeline.store.digests import data_digest
+from iowbc.processes import available_cores
 from iowbc.recipe.reading.loading import load_recipe, recipe_file
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.section import deciding
@@ -87,7 +87,7 @@ def carry(
     files = {name: recipe_file("public").parent / "public" / file for name, file in SUITES.items()}
     skipped = "left out by --engine mujoco" if engine == "mujoco" else None if drake else NO_DRAKE
     recipes = {name: load_recipe(files[name], overrides).recipe for name in SUITES if name == "mujoco" or not skipped}
-    played = {name: _play(recipe, workers or os.cpu_count() or 1) for name, recipe in recipes.items()}
+    played = {name: _play(recipe, workers or available_cores()) for name, recipe in recipes.items()}
     controller = recipes["mujoco"].eval.public
     assert controller is not None, "it is among the overrides"
     source = Path(adapter) if own else Path(SHIPPED[adapter].__code__.co_filename)

@@ -1,7 +1,6 @@
 """`iowbc compare` and `iowbc report`: tables, figures, learning curves and films over several runs."""
 
 import math
-import shutil
 import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -13,7 +12,7 @@ from rich.filesize import decimal
 
 from iowbc.commands import completion, options
 from iowbc.commands.diff import difference_lines
-from iowbc.commands.lookup import COMPARISON_RECORD, FILM, film_of, members_of, named, points_of, record_comparison
+from iowbc.commands.lookup import COMPARED, FILM, film_of, members_of, named, points_of, start_comparison
 from iowbc.commands.printed import film_progress, print_json, shown_path, stdout_console, tell
 from iowbc.commands.results import PROBE, TRIALS, evaluated_actor, split_tables, tables_of
 from iowbc.errors import UsageError
@@ -64,21 +63,18 @@ def compare(
     output = output or (store.runs.compared / Path(words[0]).stem if members else store.runs.compared)
     options.require_extra("train", "iowbc compare")
     require_writable(output, "--output")
-    require_whole(store.runs, (run.artifacts["eval"] for run in found if "eval" in run.artifacts))
-    if (output / COMPARISON_RECORD).is_file():  # of an earlier comparison
-        for part in ("tables", "figures"):
-            shutil.rmtree(output / part, ignore_errors=True)
-    record_comparison([run.label for run in found], output)
+    tried = _having(found, TRIALS)
+    if film and len(tried) < 2:
+        raise UsageError("--film shows evaluated runs side by side: two or more must have finished the stage eval")
+    require_whole(store.runs, (artifact for run in found for artifact in run.artifacts.values()))
+    start_comparison([run.label for run in found], output)
     metrics = metrics_table(grouped(found))
     (output / "metrics.md").write_text(markdown(metrics), encoding="utf-8")
-    tried = _having(found, TRIALS)
     missing = [name for name in members if name not in {run.label for run in tried}]
     _report_probes(found, output)
     if len(tried) > 1 or (tried and members):
         report_joint(tried, output, missing)
     if film:
-        if len(tried) < 2:
-            raise UsageError("--film shows evaluated runs side by side: two or more must have finished the stage eval")
         _film(store, console, tried, output / FILM, quiet=as_json)
     curves = _learning_curves(found, output)
     if as_json:
@@ -91,9 +87,11 @@ def compare(
     if missing:
         text = f"not compared, for their eval has not run: {', '.join(missing)}; `iowbc plan {words[0]}` says how long "
         tell(console, f"{text}that takes")
-    for path in sorted(output.iterdir(), key=lambda path: (path.is_dir(), path)):
-        count = sum(1 for _ in path.rglob("*.*"))
-        tell(console, shown_path(path) + (f"/ ({count} file{'s' if count != 1 else ''})" if path.is_dir() else ""))
+    for path in (path for path in sorted(output.iterdir()) if path.is_file()):
+        tell(console, shown_path(path))
+    for part in (output / name for name in COMPARED):
+        if count := sum(1 for _ in part.rglob("*.*")):
+            tell(console, f"{shown_path(part)}/ ({count} file{'s' if count != 1 else ''})")
 
 
 def report(
@@ -164,7 +162,8 @@ def _data(found: Sequence[Run], output: Path) -> dict[str, Any]:
         for run in found
         for stage, artifact in run.artifacts.items()
     ]
-    return {"metrics": metrics, "files": [shown_path(path) for path in sorted(output.rglob("*.*"))]}
+    files = [path for part in (output, *(output / name for name in COMPARED)) for path in part.glob("*.*")]
+    return {"metrics": metrics, "files": [shown_path(path) for path in sorted(files)]}
 
 
 def _learning_curves(found: Sequence[Run], output: Path) -> "dict[str, list[CurvePanel]]":

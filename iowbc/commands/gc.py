@@ -105,7 +105,6 @@ def _to_remove(
         for path in runs.tracking.glob("*.jsonl"):
             with Journal(path) as journal:
                 if journal.acquire() and not unsent(path):
-                    yield path
-                    yield sent_path(path)
+                    yield from (one for one in (path, sent_path(path)) if one.exists())
     if damaged:
         yield from runs.damaged.glob("*")

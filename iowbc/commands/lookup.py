@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -31,6 +32,8 @@ SWEEP_RECORD, COMPARISON_RECORD = "sweep.json", "runs.json"
 """Files of a sweep with its points, and of a comparison with its runs."""
 FILM = "side_by_side.mp4"
 """Film of one trial of a comparison."""
+COMPARED = ("tables", "figures")
+"""Folders of a comparison."""
 PLAYED = "teacher"
 """The stage whose checkpoint can be played."""
 CHECKPOINT = Path("scratch", "training.checkpoint")
@@ -146,9 +149,16 @@ def record_sweep(found: Sweep, folder: Path) -> None:
     write_whole(folder / SWEEP_RECORD, json.dumps({"axes": found.axes, "points": points}, indent=1))
 
 
-def record_comparison(words: Sequence[str], folder: Path) -> None:
-    """Keep the names of the runs in the folder of their comparison."""
-    write_whole(folder / COMPARISON_RECORD, json.dumps({"runs": list(words)}, indent=1))
+def start_comparison(words: Sequence[str], folder: Path) -> None:
+    """Remove the tables and figures of an earlier comparison from a folder, and the film of other runs, and keep the
+    names of the new runs in it."""
+    record = folder / COMPARISON_RECORD
+    if record.is_file():
+        for part in COMPARED:
+            shutil.rmtree(folder / part, ignore_errors=True)
+    if sorted(_recorded(record, "runs")) != sorted(words):
+        (folder / FILM).unlink(missing_ok=True)
+    write_whole(record, json.dumps({"runs": list(words)}, indent=1))
 
 
 def points_of(store: Store, words: Sequence[str]) -> list[str]:
@@ -201,7 +211,7 @@ class UnfinishedTraining:
 def in_training(store: Store, word: str, stage: str | None) -> UnfinishedTraining | None:
     """The newest unfinished training that `RECIPE/STAGE`, or a recipe and `--stage`, names, if there is one."""
     name, slash, last = word.rpartition("/")
-    name, wanted = (name, last) if slash else (word, stage)
+    name, wanted = (name, last) if slash and Path(word).suffix not in SUFFIXES else (word, stage)
     if wanted not in STAGES or not STAGES[wanted].trained_by:
         return None
     own = [one for one in unfinished(store.runs) if (one[1].stage, one[1].recipe) == (wanted, Path(name).stem)]

@@ -16,7 +16,8 @@ from iowbc.commands.compare import compare, report
 from iowbc.commands.lookup import open_artifact, points_of
 from iowbc.commands.play import named_source
 from iowbc.errors import UsageError
-from iowbc.pipeline.store.artifact import write_manifest
+from iowbc.files import file_digest
+from iowbc.pipeline.store.artifact import MANIFEST, FileRecord, Manifest, write_manifest
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
 
@@ -136,6 +137,13 @@ def test_compare_shows_only_what_differs_and_by_how_much_and_the_learning_curves
         summary = {"metrics": {"count": count, "same": 1.0}}
         (artifact / "summary.json").write_text(json.dumps(summary))
         pd.DataFrame({"step": [1, 2], "reward": [0.0, count]}).to_parquet(artifact / "tables/learning_curves.parquet")
+        if name == "first":
+            refused = command("compare", "first", "second")
+            assert "is damaged: summary.json" in refused.stderr
+            assert not (folder / "runs" / "compare").exists() or not any((folder / "runs" / "compare").iterdir())
+        sealed_anew(artifact)
+    (folder / "runs" / "compare" / "paper").mkdir()
+    (folder / "runs" / "compare" / "paper" / "runs.json").touch()
     done = command("compare", "first", "second")
     assert done.returncode == 0, done.stderr
     table = (folder / "runs" / "compare" / "metrics.md").read_text()
@@ -149,13 +157,26 @@ def test_compare_shows_only_what_differs_and_by_how_much_and_the_learning_curves
     assert "▁█ 5  second" in done.stdout
 
 
+def sealed_anew(artifact: Path) -> None:
+    """Let the manifest of an artifact record its files as they are."""
+    manifest = Manifest.model_validate_json((artifact / MANIFEST).read_bytes())
+    files = {
+        name: FileRecord(sha256=file_digest(artifact / name), size=(artifact / name).stat().st_size)
+        for name in manifest.files
+    }
+    write_manifest(artifact, manifest.model_copy(update={"files": files}))
+
+
 def test_gc_removes_what_it_is_told_to_and_nothing_else(folder: Path, command: Command, key: Key) -> None:
     teachers = folder / "runs" / "store" / "teacher"
     assert "would remove" in command("gc", "--recipe", "second", "--dry-run").stdout
     assert len(list(teachers.iterdir())) == 2
     assert command("gc", "--unused").stdout == "0 bytes in all\n"
     assert command("gc", "--recipe", "second", "--older-than", "1").stdout == "0 bytes in all\n"
-    assert command("gc", "--recipe", "second").returncode == 0
+    (folder / "runs" / "tracking").mkdir(exist_ok=True)
+    (folder / "runs" / "tracking" / "20260101-empty-1.jsonl").touch()  # its disk was full at once
+    assert command("gc", "--recipe", "second", "--work").returncode == 0
+    assert not [*(folder / "runs" / "tracking").glob("*-empty-*")]
     assert [path.name for path in teachers.iterdir()] == [key("first", "teacher")]
     assert "all stages are cached" in command("plan", "first.yaml").stdout
 

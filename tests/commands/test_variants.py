@@ -9,7 +9,7 @@ from typing import Any, cast
 from made_up_trials import trials_of
 
 from iowbc.commands.compare import report_joint
-from iowbc.commands.lookup import film_of, points_of, record_comparison
+from iowbc.commands.lookup import film_of, points_of, start_comparison
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
 from iowbc.report.runs import Run, grouped
@@ -132,8 +132,22 @@ def test_the_film_of_a_comparison_is_found_by_its_runs_in_any_order(tmp_path: Pa
     runs = Runs(tmp_path)
     folder = runs.compared / "both"
     folder.mkdir(parents=True)
-    record_comparison(["first", "third"], folder)
+    start_comparison(["first", "third"], folder)
     assert film_of(runs, ["first", "third"]) is None, "none was made"
     (folder / "side_by_side.mp4").write_bytes(b"film")
     assert film_of(runs, ["third", "first"]) == folder / "side_by_side.mp4"
     assert film_of(runs, ["first"]) is None
+
+
+def test_a_new_comparison_of_the_same_runs_keeps_their_film_and_one_of_others_removes_it(tmp_path: Path) -> None:
+    runs = Runs(tmp_path)
+    folder = runs.compared
+    (folder / "tables").mkdir(parents=True)
+    start_comparison(["first", "third"], folder)
+    (folder / "side_by_side.mp4").write_bytes(b"film")
+    (folder / "tables" / "old.md").touch()
+    start_comparison(["third", "first"], folder)
+    assert film_of(runs, ["first", "third"]) == folder / "side_by_side.mp4"
+    assert not (folder / "tables").exists()
+    start_comparison(["first", "second"], folder)
+    assert film_of(runs, ["first", "second"]) is None

@@ -3,6 +3,7 @@
 import json
 import re
 import shutil
+import subprocess
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -16,10 +17,11 @@ from iowbc.control.command import nominal_command
 from iowbc.control.sensors import Measured
 from iowbc.deploy.controller import Controller
 from iowbc.deploy.exported_folder import GOLDEN, exported_folder
+from iowbc.deploy.guard import JUMP, TargetGuard
 from iowbc.evaluation.exported import exported_world
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import Robot
-from iowbc.web.page import write_page
+from iowbc.web.page import SOURCE, write_page
 from iowbc.web.scenes import begun
 
 pytestmark = pytest.mark.timeout(900)
@@ -142,3 +144,20 @@ def test_a_visitor_moves_the_sliders_and_no_other_place_is_asked(page: Path, ans
     assert {re.sub(r":\d+/", "/", address) for address in told["addresses"]} == {
         f"http://127.0.0.1/{name}" for name in ASKED
     }
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="no Node.js")
+@pytest.mark.parametrize("share", [0.9, 1.1])
+def test_the_page_holds_targets_that_jump_as_python_does(share: float) -> None:
+    limit, period = 10.0, 0.02
+    jump = share * JUMP * limit * period
+    guard = TargetGuard(1, np.array([limit]), period)
+    guard.passed(np.zeros((1, 1)), np.array([True]), np.zeros((1, 1)))
+    _, (reason,) = guard.passed(np.array([[jump]]), np.array([False]), np.zeros((1, 1)))
+    script = (
+        f"import {{ Guard }} from {json.dumps((SOURCE / 'guard.js').as_uri())};"
+        f"const guard = new Guard([{limit}], {period}); guard.passed([0], [0]);"
+        f"console.log(guard.passed([{jump}], [0]).held)"
+    )
+    told = subprocess.run(["node", "--input-type=module", "-e", script], capture_output=True, text=True, check=True)
+    assert told.stdout.strip() == str(bool(reason)).lower() == str(share > 1.0).lower()

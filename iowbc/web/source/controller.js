@@ -11,7 +11,7 @@ export class Controller {
     if (contract.format !== FORMAT) throw new Error(`contract.json: format ${contract.format}, expected ${FORMAT}`);
     Object.assign(this, { contract, graphs: { settle, step } });
     this.period = 1 / contract.control_frequency;
-    this.guard = new Guard(contract.velocity_limit.map((limit) => limit * this.period));
+    this.guard = new Guard(contract.velocity_limit, this.period);
     this.shapes = Object.fromEntries(contract.inputs.map(({ name, shape }) => [name, shape]));
     const sizes = contract.state.map(({ shape }) => shape.reduce((product, length) => product * length, 1));
     const place = contract.state.findIndex(({ name }) => name === "action");

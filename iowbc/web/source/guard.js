@@ -1,9 +1,12 @@
 /** What is passed on to the motors: targets that are numbers, and that a joint could have followed. */
 
+/** Largest change of a target, as a multiple of the joint's velocity limit times the elapsed time: JUMP of the guard in Python. */
+const JUMP = 2;
+
 export class Guard {
-  /** `reach`: how far each joint moves in a control period at most [rad]. */
-  constructor(reach) {
-    this.reach = reach;
+  /** `limits`: the joints' velocity limits [rad/s]; `period`: control period [s]. */
+  constructor(limits, period) {
+    this.reach = limits.map((limit) => JUMP * limit * period);
     this.start();
   }
 
