@@ -46,7 +46,6 @@ measure: run
 	$(BIN)/iowbc run recipes/teacher.yaml
 	$(BIN)/iowbc run recipes/probe.yaml
 	$(BIN)/iowbc compare paper
-	$(BIN)/iowbc bench rg
 	$(BIN)/iowbc bench sim
 	$(BIN)/iowbc bench train
 	$(BIN)/iowbc bench control full

@@ -52,7 +52,6 @@ COMMANDS = {
 BENCHMARKS = {
     "sim": ("bench", "Measure the vector environment's speed against a bare MuJoCo loop; results go to MLflow."),
     "train": ("bench", "Measure the teacher's training speed against plain stable-baselines3; results go to MLflow."),
-    "rg": ("bench", "Measure the speed of each labelling method of the reference generator; results go to MLflow."),
     "control": (
         "bench",
         "Measure the control step's time of an exported controller on one thread, without torch or a simulator.",

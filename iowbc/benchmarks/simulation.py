@@ -1,22 +1,15 @@
-"""`iowbc bench sim`: the vector environment against a bare loop of `mj_step`, and against other vector environments."""
+"""`iowbc bench sim`: the vector environment against a bare loop of `mj_step`."""
 
 import time
 from collections.abc import Sequence
-from functools import partial
-from typing import Any
 
-import gymnasium
 import numpy as np
-from stable_baselines3.common.vec_env import SubprocVecEnv
 
 from iowbc.benchmarks.bare_loop import bare_loops, random_actions
 from iowbc.benchmarks.breakdown import PARTS, step_breakdown, transfer_time
 from iowbc.benchmarks.standing_generator import benchmark_world
 from iowbc.processes import available_cores
 from iowbc.recipe.recipe import Recipe
-from iowbc.robot.description import load_robot
-from iowbc.task.gym.environment import Environment
-from iowbc.task.specification import Specification
 from iowbc.task.vector.setup import Setup
 from iowbc.task.vector.vector_env import VectorEnv
 
@@ -33,14 +26,12 @@ def main(
     environments: int = 48,
     workers: Sequence[int] = (),
     turns: int = 15,
-    others: bool = True,
 ) -> dict[str, float]:
     """Measures, prints the tables, returns every figure by name (rates in environment steps a second, times in ms).
 
     `environments`: per worker; `workers`: counts to measure, by default 1, 2 and the number of cores. The bare loop and
     the vector environment alternate, `turns` times. Rates are of the best repetition, which other programs disturbed
     least; the ratio is the median over repetitions, each of the environment's rate to that of the bare loop before it.
-    `others`: also measure stable-baselines3's and gymnasium's vector environments.
     """
     cores = available_cores()
     counts = sorted(set(workers) or {1, 2, cores})
@@ -53,8 +44,6 @@ def main(
         for count in counts:
             setup = Setup(specification, count * environments, recipe.seed)
             figures |= _against_bare(setup, count, turns, environments * parts["reset"])
-            if others:
-                figures |= _others(specification, scene, count, figures[f"vector_env_{count}"])
         parts["transfer"] = figures[f"transfer_ms_{counts[-1]}"]
         total = sum(parts[name] for name in (*PARTS, "transfer"))
         print(f"a step of {environments} environments: {total:.2f} ms")
@@ -101,29 +90,3 @@ def _rate(env: VectorEnv) -> float:
     for action in given:
         env.step(action)
     return float(env.num_envs * PERIODS / (time.perf_counter() - begin))
-
-
-def _others(specification: Specification, scene: str, count: int, own: float) -> dict[str, float]:
-    """Rates of other vector environments, the best of five: one environment per process, `count` processes."""
-    make = partial(Environment, scene, specification.recipe, specification.robot, specification.rg)
-    width = load_robot(specification.robot).support.size
-    figures = {}
-    for name, label, build in (
-        ("sb3", "SB3 SubprocVecEnv", partial(SubprocVecEnv, start_method="forkserver")),
-        ("gymnasium", "gymnasium AsyncVectorEnv", partial(gymnasium.vector.AsyncVectorEnv, context="forkserver")),
-    ):
-        env: Any = build([make] * count)
-        rates = []
-        try:
-            for _ in range(5):
-                env.reset()
-                begin = time.perf_counter()
-                for period in range(PERIODS):
-                    env.step(random_actions(period, count, width))
-                rates.append(count * PERIODS / (time.perf_counter() - begin))
-        finally:
-            env.close()
-        rate = figures[f"{name}_{count}"] = max(rates)
-        name = f"{label}, {count} process(es)"
-        print(f"{name:34}{rate:10.0f}{'':12}vector environment {own / rate:.1f} times as fast")
-    return figures

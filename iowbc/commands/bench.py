@@ -12,7 +12,6 @@ from iowbc.pipeline.store.runs import Runs, require_writable_runs
 from iowbc.pipeline.tracking.tracker import record_figures
 from iowbc.recipe.reading.loading import load_recipe
 from iowbc.recipe.recipe import Recipe
-from iowbc.recipe.simulation.holding import FREE
 from iowbc.robot.description import robot_folder
 
 BenchRecipe = Annotated[Path | None, typer.Argument(help="Recipe file (default: built-in values).", metavar="RECIPE")]
@@ -24,14 +23,13 @@ def sim(
     scene: options.SceneName = "lift",
     environments: Annotated[int, typer.Option(help="Environments per worker.", min=1)] = 48,
     workers: BenchWorkers = None,
-    others: Annotated[bool, typer.Option(help="Also measure other vector environments (default: on).")] = True,
     runs: options.RunsFolder = options.RUNS,
 ) -> None:
-    """Measure the vector environment. Raises `UsageError`, as the two below do."""
+    """Measure the vector environment. Raises `UsageError`, as the one below does."""
     own, counts = _checked(runs, recipe, scene), tuple(workers or ())
     from iowbc.benchmarks import simulation
 
-    figures = simulation.main(own, scene=scene, environments=environments, workers=counts, others=others)
+    figures = simulation.main(own, scene=scene, environments=environments, workers=counts)
     record_figures(Runs(runs), "bench-sim", figures)
 
 
@@ -50,14 +48,6 @@ def train(
     from iowbc.benchmarks import training
 
     record_figures(Runs(runs), "bench-train", training.main(own, scene=scene, turns=turns, others=others))
-
-
-def rg(recipe: BenchRecipe = None, workers: BenchWorkers = None, runs: options.RunsFolder = options.RUNS) -> None:
-    """Measure the reference generator's labelling."""
-    own = _checked(runs, recipe)
-    from iowbc.benchmarks import reference
-
-    record_figures(Runs(runs), "bench-rg", reference.main(own, workers=tuple(workers or ())))
 
 
 def control(
@@ -87,7 +77,7 @@ def engines(
         raise IowbcError(f"the engines differ by more than expected: {', '.join(differing)}")
 
 
-def _checked(runs: Path, file: Path | None, scene: str = FREE) -> Recipe:
+def _checked(runs: Path, file: Path | None, scene: str) -> Recipe:
     """The recipe in a file, or the default one, once everything that a benchmark needs is there. Raises `UsageError`,
     also for a scene that it does not have."""
     recipe = load_recipe(file).recipe if file is not None else Recipe(name="bench")

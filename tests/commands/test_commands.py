@@ -56,7 +56,6 @@ def test_a_wrong_recipe_fails_at_once(tmp_path: Path) -> None:
         (["compare", "first", "second", "--output", "first.yaml"], "give another folder with --output"),
         (["ui", "--runs", "first.yaml"], "first.yaml cannot be written"),
         (["run", "first.yaml", "--until", "rg-fit", "--force", "teacher"], "teacher comes after rg-fit"),
-        (["bench", "rg", "--runs", "first.yaml"], "first.yaml cannot be written"),
         (["bench", "sim", "--runs", "first.yaml"], "first.yaml cannot be written"),
         (["ls", "techer"], "did you mean 'teacher'?"),
         (["gc"], "--unused"),
