@@ -7,6 +7,9 @@ import subprocess
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from iowbc.deploy import exported_folder
 from iowbc.errors import UsageError
@@ -26,7 +29,7 @@ LIBRARY, PAGE = "iowbc.js", "page.js"
 BUNDLING = ("--bundle", "--format=esm", "--minify", "--target=es2022", "--external:module", "--log-level=warning")
 LAST_LINES = 6
 SCENES = "scenes.json"
-"""File that the page adds to the exported ones, with scenes, the first scene, and the name of the golden vectors."""
+"""File that the page adds to the exported ones, with scenes, the first scene, and the golden vectors."""
 
 
 def write_page(exported: Path, out: Path, cache: Path, say: Callable[[str], None]) -> None:
@@ -37,17 +40,25 @@ def write_page(exported: Path, out: Path, cache: Path, say: Callable[[str], None
     parts = npm_parts(cache, say)
     world = exported_world(exported)
     out.mkdir(parents=True, exist_ok=True)
-    golden = [exported_folder.GOLDEN] if (exported / exported_folder.GOLDEN).is_file() else []
-    for name in (exported_folder.SETTLE, exported_folder.STEP, exported_folder.CONTRACT, *golden):
+    for name in (exported_folder.SETTLE, exported_folder.STEP, exported_folder.CONTRACT):
         shutil.copyfile(exported / name, out / name)
     robot = load_robot(world.robot)
     about = {
         "scenes": web_scenes(world, robot),
         "first": first_scene(world.recipe),
-        "golden": exported_folder.GOLDEN if golden else None,
+        "golden": golden_vectors(exported),
     }
     (out / SCENES).write_text(json.dumps(about, separators=(",", ":")), encoding="utf-8")
     bundle(parts, out)
+
+
+def golden_vectors(exported: Path) -> dict[str, list[Any]] | None:
+    """Golden vectors of an exported folder by name, a row for each step; None where it has none."""
+    path = exported / exported_folder.GOLDEN
+    if not path.is_file():
+        return None
+    with np.load(path, allow_pickle=False) as file:
+        return {name: values.tolist() for name, values in file.items()}
 
 
 def npm_parts(cache: Path, say: Callable[[str], None]) -> Path:

@@ -28,7 +28,7 @@ pytestmark = pytest.mark.timeout(900)
 
 PERIODS = 50
 ASKED = (
-    *("style.css", "page.js", "iowbc.js", "contract.json", "scenes.json", "settle.onnx", "step.onnx", "golden.npz"),
+    *("style.css", "page.js", "iowbc.js", "contract.json", "scenes.json", "settle.onnx", "step.onnx"),
     *("mujoco.wasm", "onnxruntime.wasm"),
 )
 """Everything that a page loads."""

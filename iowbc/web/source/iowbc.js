@@ -3,10 +3,9 @@
 import loadMujoco from "@mujoco/mujoco";
 import * as ort from "onnxruntime-web/wasm";
 import { Controller } from "./controller.js";
-import { readNpz } from "./npz.js";
 import { World } from "./world.js";
 
-export { Controller, World, readNpz };
+export { Controller, World };
 export { largestDifferences } from "./golden.js";
 
 ort.env.wasm.numThreads = 1;
@@ -31,7 +30,6 @@ export async function load(folder = new URL("./", import.meta.url)) {
     loadMujoco({ locateFile: () => at("mujoco.wasm").href }),
   ]);
   const session = (graph) => ort.InferenceSession.create(graph, { executionProviders: ["wasm"] });
-  const golden = about.golden && (await readNpz(await binary(about.golden)));
   const controller = new Controller(contract, await session(settle), await session(step));
-  return { contract, scenes: about.scenes, first: about.first, mujoco, controller, golden };
+  return { contract, ...about, mujoco, controller };
 }

@@ -86,7 +86,7 @@ class Page {
   /** Holds this browser's controller against the exported one. */
   async check() {
     const largest = await largestDifferences(this.controller, this.golden);
-    this.panel.agreement(Math.max(...Object.values(largest)), this.golden["input/command"].shape[0]);
+    this.panel.agreement(Math.max(...Object.values(largest)), this.golden["input/command"].length);
     this.begin(this.name);
   }
 }
