@@ -147,7 +147,7 @@ def test_a_recipe_that_several_begin_from_is_planned_once(tmp_path: Path, monkey
         return decide(self, stage, inputs)
 
     monkeypatch.setattr(Planner, "decide", counted)
-    experts = load_recipe(Path(__file__).parents[2] / "recipes" / "experts" / "still.yaml")
+    experts = load_recipe(Path(__file__).parents[2] / "recipes" / "experts" / "quick.yaml")
     planner_for(experts, STAGES, Store(Runs(tmp_path)), robot_folder("g1"), Options()).plan()
     assert len(decided) > 20
     assert set(decided.values()) == {1}

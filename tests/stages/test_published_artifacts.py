@@ -30,7 +30,6 @@ PUBLISHED_TO = {
     "wo_rg": "eval",
     "wo_distill": "eval",
     "blind": "export",
-    "compliant": "export",
     "compliant_quick": "eval",
     "compliant_wide": "teacher",
     "compliant_pace": "teacher",
@@ -102,7 +101,7 @@ def test_a_fresh_clone_has_a_skill_whose_partner_one_can_be(tmp_path: Path) -> N
     asked = [("transport", None), ("transport/skill", None), ("transport", "skill")]
     found = [skill_to_play(store, *one) for one in asked]
     assert all(one is not None and (one.manifest.stage, one.manifest.recipe) == ("skill", "transport") for one in found)
-    for other in (("transport", "teacher"), ("full", None), ("compliant", None), ("nothing", None)):
+    for other in (("transport", "teacher"), ("full", None), ("nothing", None)):
         assert skill_to_play(store, *other) is None
 
 
