@@ -11,8 +11,9 @@ import typer
 
 from iowbc.commands import options
 from iowbc.commands.printed import stdout_console, tell
+from iowbc.errors import UsageError
 from iowbc.pipeline.store.runs import Runs, require_writable_runs
-from iowbc.pipeline.tracking.delivery import embedded_uri, open_experiment
+from iowbc.pipeline.tracking.delivery import URI_VARIABLE, embedded_uri, open_experiment, tracking_uri
 from iowbc.pipeline.tracking.tracker import backlog, start_sender
 from iowbc.recipe.execution import Execution
 from iowbc.stages.registry import STAGES
@@ -29,6 +30,11 @@ def ui(
     runs, console = Runs(folder), stdout_console()
     options.require_extra("train", "iowbc ui")
     require_writable_runs(runs)
+    if elsewhere := tracking_uri():
+        raise UsageError(
+            f"runs are recorded in {elsewhere} ({URI_VARIABLE}): open that server's page, or unset the variable to see "
+            f"those recorded in {runs.database}"
+        )
     options.require_free(port)
     signal.signal(signal.SIGTERM, signal.getsignal(signal.SIGINT))
     uri = embedded_uri(runs)

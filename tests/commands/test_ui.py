@@ -16,7 +16,8 @@ from typing import Any
 import pytest
 from network_watch import watched
 
-from iowbc.commands.ui import view
+from iowbc.commands.ui import ui, view
+from iowbc.errors import UsageError
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.tracking.journal import Journal
 from iowbc.pipeline.tracking.tracker import DESCRIPTION
@@ -29,6 +30,14 @@ def free_port() -> int:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])
+
+
+def test_runs_that_are_recorded_on_a_server_are_not_looked_for_here(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MLFLOW_TRACKING_URI", "http://127.0.0.1:9")
+    with pytest.raises(UsageError, match=r"recorded in http://127\.0\.0\.1:9 \(MLFLOW_TRACKING_URI\)"):
+        ui(free_port(), tmp_path / "runs")
 
 
 def test_a_taken_port_is_refused_with_a_free_one(tmp_path: Path) -> None:
