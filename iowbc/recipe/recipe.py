@@ -90,7 +90,8 @@ class Recipe(Section):
 
 
 def recipe_schema() -> dict[str, Any]:
-    """JSON Schema of a recipe file: the recipe's fields with their attribute docstrings, and `extends`.
+    """JSON Schema of a recipe file: the recipe's fields with their attribute docstrings, `extends`, and the `variants` of
+    a study.
 
     No key is required, because sections may be partial; `iowbc plan` reports missing keys of list entries.
     """
@@ -99,5 +100,7 @@ def recipe_schema() -> dict[str, Any]:
         definition.pop("required", None)
     schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
     extends = {"type": "string", "description": "Recipe file, relative to this one, that this one changes."}
-    schema["properties"] = {"extends": extends, **schema["properties"]}
+    variants = {"type": "array", "items": {"type": "string"}, "minItems": 2}
+    variants["description"] = "Recipes that run one after another and are then compared, by name or file."
+    schema["properties"] = {"extends": extends, "variants": variants, **schema["properties"]}
     return schema

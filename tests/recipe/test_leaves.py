@@ -2,16 +2,19 @@
 
 import json
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import jsonschema
 import pytest
+import yaml
 
 from iowbc.recipe.reading.document import located, plain
 from iowbc.recipe.reading.loading import overridden
 from iowbc.recipe.reading.validation import validate
 from iowbc.recipe.recipe import Recipe, recipe_schema
 
+RECIPES = Path(__file__).parents[2] / "recipes"
 USUAL = Recipe(name="usual")
 
 
@@ -62,3 +65,8 @@ def test_a_part_of_a_section_keeps_the_rest_of_its_default(schema: Any, given: d
 def test_the_schema_knows_every_key_of_a_section(schema: Any) -> None:
     with pytest.raises(jsonschema.ValidationError, match="Additional properties"):
         schema.validate({"name": "mine", "task": {"reward": {"sync": {"height": {"wieght": 2}}}}})
+
+
+@pytest.mark.parametrize("file", sorted(RECIPES.rglob("*.yaml")), ids=lambda file: file.stem)
+def test_the_schema_allows_every_shipped_recipe_and_study(schema: Any, file: Path) -> None:
+    schema.validate(yaml.safe_load(file.read_text(encoding="utf-8")))
