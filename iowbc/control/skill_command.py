@@ -16,7 +16,9 @@ class SkillCommand:
         self._robot, self._pushing = robot, pushing
         self._commands = commands
         self._still = np.tile(nominal_command(commands), (len(pushing), 1))
-        self._still[pushing, PITCH] = self._robot.push_pitch
+        self._still[pushing, PITCH] = robot.push_pitch
+        if robot.push_height is not None:
+            self._still[pushing, HEIGHT] = robot.push_height
         self._scale = np.array([*robot.velocity, robot.yaw_rate, robot.height, robot.pitch, *[robot.offset] * 6])
         ahead = np.where(pushing[:, None, None], _ranges(commands.pushing), _ranges(commands))
         self._low, self._high = ahead[:, 0], ahead[:, 1]

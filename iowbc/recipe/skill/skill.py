@@ -160,6 +160,9 @@ class RobotAgent(Section):
     """Largest change of a wrist offset by the action [m]."""
     push_pitch: float = 0.2
     """Torso pitch of the nominal command in a push [rad], that of the trials' sequences."""
+    push_height: float | None = Field(default=None, gt=0.0, json_schema_extra=LATER)
+    """Height of the nominal command in a push [m]; empty: the nominal height. At 0.66 m and a pitch of 0.4 rad
+    `compliant_merged` pushes 80 kg at 0.63 of the pace, at 0.72 m and 0.2 rad at 0.44."""
     admittance: tuple[float, float] = (0.012, 0.008)
     """Admittance of a nominal follower: velocity per force on its hands, forward and to the left [m/(N·s)]: 30 N make
     it walk at 0.36 m/s."""
