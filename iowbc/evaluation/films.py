@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from iowbc.errors import NoRenderer
+from iowbc.evaluation.report.aggregate import case_names
 from iowbc.evaluation.trials.fixed_batch import in_batch
 from iowbc.evaluation.trials.plan import Trial
 from iowbc.evaluation.trials.rollout import play_in
@@ -75,8 +76,8 @@ def filmed(trials: pd.DataFrame, count: int) -> list[tuple[str, "pd.Series[Any]"
     first = first[first["mass"] > 0] if (first["mass"] > 0).any() else first
     ends = (0, len(first) - 1) if count > 1 else ((len(first) - 1) // 2,) * 2
     places = np.linspace(*ends, min(count, len(first))).round().astype(int)
-    rows = [first.iloc[place] for place in dict.fromkeys(places.tolist())]
-    return [(f"{row['case']}_{row['mass']:g}kg".translate(NOT_WORD), row) for row in rows]
+    rows = [(case_names(first).iloc[place], first.iloc[place]) for place in dict.fromkeys(places.tolist())]
+    return [(f"{case}_{row['mass']:g}kg".translate(NOT_WORD), row) for case, row in rows]
 
 
 def command_line(signals: dict[str, Any], seconds: float) -> str:

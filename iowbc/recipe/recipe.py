@@ -73,11 +73,16 @@ class Recipe(Section):
         if self.teacher.symmetry == "construction" and unpaired:
             text = "with teacher.symmetry 'construction' the mirror swaps units of latent and hidden in pairs"
             yield "", f"distill: {text}; {unpaired[0]} is odd, give an even number"
-        period, step = 1.0 / self.task.control_frequency, self.simulation.physics.timestep
-        steps = round(period / step)
-        if steps < 1 or abs(steps * step - period) > 1e-9:
-            text = f"{step:g} s does not divide a control period of {period:g} s; take {period / max(1, steps):.6g} s"
-            yield "simulation.physics.timestep", text
+        period, timesteps = 1.0 / self.task.control_frequency, {"simulation.physics": self.simulation.physics.timestep}
+        if self.eval.simulation is not None:
+            timesteps["eval.simulation.physics"] = self.eval.simulation.physics.timestep
+        if self.eval.engine == "drake":
+            timesteps["eval.drake"] = self.eval.drake.timestep
+        for section, step in timesteps.items():
+            steps = round(period / step)
+            if steps < 1 or abs(steps * step - period) > 1e-9:
+                better = f"take {period / max(1, steps):.6g} s"
+                yield f"{section}.timestep", f"{step:g} s does not divide a control period of {period:g} s; {better}"
         yield from scene_name_problems(self)
 
     @field_validator("stages")
@@ -90,8 +95,7 @@ class Recipe(Section):
 
 
 def recipe_schema() -> dict[str, Any]:
-    """JSON Schema of a recipe file: the recipe's fields with their attribute docstrings, `extends`, and the `variants` of
-    a study.
+    """JSON Schema of a recipe file: the fields with their docstrings, `extends`, and the `variants` of a study.
 
     No key is required, because sections may be partial; `iowbc plan` reports missing keys of list entries.
     """

@@ -143,11 +143,13 @@ class Draws:
         light, slow = chance[:, 0] < settings.light_share, chance[:, 1] < settings.slow_share
         low = settings.object_mass_scale.low
         scale = low * (max(settings.light_end, low) / low) ** chance[:, 2]
-        row[light, self._table.columns["object_mass_scale"].start] = scale[light]
+        if settings.object_mass_scale.enabled:
+            row[light, self._table.columns["object_mass_scale"].start] = scale[light]
         for place, name in enumerate(("action_latency", "sensor_latency"), 3):
-            low, high = getattr(settings, name).low, getattr(settings, name).high
-            latency = high - (high - low) / 3.0 * chance[:, place]
-            row[slow, self._table.columns[name].start] = latency[slow]
+            drawn = getattr(settings, name)
+            latency = drawn.high - (drawn.high - drawn.low) / 3.0 * chance[:, place]
+            if drawn.enabled:
+                row[slow, self._table.columns[name].start] = latency[slow]
 
     def _hold(self, name: str, which: Indices, values: Array) -> None:
         held = which[~np.isnan(values[which])]

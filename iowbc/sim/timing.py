@@ -15,7 +15,7 @@ class Timing:
         if self.substeps < 1 or abs(self.substeps * timestep - period) > 1e-9:
             raise ValueError(
                 f"a control period of {period:g} s is no whole number of physics steps of {timestep:g} s; "
-                f"choose simulation.physics.timestep as {period:g} s divided by a whole number"
+                f"choose the time step as {period:g} s divided by a whole number"
             )
 
     @property

@@ -173,15 +173,17 @@ def play_batch(
 def headline(summary: "pd.DataFrame") -> dict[str, float]:
     """Main metrics: success and errors of each case and at the lightest and heaviest mass of each suite, and forces of
     compliance trials."""
+    from iowbc.evaluation.report.aggregate import case_names
     from iowbc.evaluation.report.other_tables import PROBING
     from iowbc.evaluation.trials.errors import ERRORS
 
     metrics = {name: float(summary[name].sum()) for name in ("trials", "survived", "succeeded")}
-    for _, row in summary[~summary["kind"].isin(PROBING)].iterrows():
+    shown = summary[~summary["kind"].isin(PROBING)]
+    for _, row in shown.assign(named=case_names(shown)).iterrows():
         rows = summary[summary["suite"] == row["suite"]]
         if row["case"] == row["suite"] and row["mass"] not in (rows["mass"].min(), rows["mass"].max()):
             continue
-        name = f"{row['case']}/{row['mass']:g}kg".replace(" ", "_").replace("%", "percent")
+        name = f"{row['named']}/{row['mass']:g}kg".replace(" ", "_").replace("%", "percent")
         metrics[f"{name}/success"] = float(row["rate"])
         if not math.isnan(row["transport_robot"]):
             metrics[f"{name}/transport"] = float(row["transport_robot"])

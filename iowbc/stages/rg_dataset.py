@@ -102,6 +102,11 @@ def run(job: Job) -> None:
         draw_strip(figures / "postures.png", robot, recipe, plan)
     except NoRenderer as error:
         job.report.say(f"no picture of postures: {error}")
+    if chosen and check is None:
+        raise StageFailed(
+            f"optimal control labels none of the {len(chosen)} samples that check the static labels, so nothing says "
+            "whether they are right. Check the weights in rg.problem, or set rg.crosscheck.samples to 0"
+        )
     if check is not None and check.metrics["crosscheck_p90"] > recipe.crosscheck.p90_limit:
         raise StageFailed(
             f"static labels differ from optimal control by {check.metrics['crosscheck_p90']:.4f} rad "

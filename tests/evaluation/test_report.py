@@ -9,7 +9,7 @@ from made_up_trials import trials_of
 from matplotlib.container import ErrorbarContainer
 
 from iowbc.evaluation.paper import LIFTING, PUSHING, VARIANTS, reported
-from iowbc.evaluation.report.aggregate import aggregate, variants_of
+from iowbc.evaluation.report.aggregate import aggregate, case_names, variants_of
 from iowbc.evaluation.report.capacity import capacity_table, load_capacities, push_capacities, push_table
 from iowbc.evaluation.report.differences import difference_table, mean_difference, paired, success_p
 from iowbc.evaluation.report.error_tables import error_table, moving_table, paper_table
@@ -19,6 +19,12 @@ from iowbc.evaluation.report.other_tables import contact_table, joint_table, suc
 from iowbc.evaluation.report.report import write_report
 from iowbc.evaluation.trials.errors import ERRORS
 from iowbc.results.table import latex, markdown
+
+
+def test_a_case_that_two_suites_have_is_named_after_its_suite() -> None:
+    cases = {"lifting": ("no object", "lifting"), "pushing": ("no object",), "stagnation": ("blocked crate",)}
+    rows = pd.DataFrame([(suite, case) for suite, own in cases.items() for case in own], columns=["suite", "case"])
+    assert [*case_names(rows)] == ["lifting no object", "lifting", "pushing no object", "blocked crate"]
 
 
 def test_errors_are_means_over_the_survivors_alone() -> None:

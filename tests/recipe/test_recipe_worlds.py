@@ -86,6 +86,11 @@ def test_every_accepted_recipe_builds_its_world_or_is_refused_with_line_and_key(
     [
         ("physics: {timestep: 0.003}", "key 'simulation.physics.timestep' = 0.003: 0.003 s does not"),
         ("physics: {timestep: 0.02}\ntask: {control_frequency: 100}", "take 0.01 s"),
+        ("physics: {}\neval: {engine: drake, drake: {timestep: 0.003}}", "key 'eval.drake.timestep' = 0.003: 0.003 s"),
+        (
+            "physics: {}\neval: {simulation: {physics: {timestep: 0.003}}}",
+            "eval.simulation.physics.timestep' = 0.003",
+        ),
         (
             "randomization: {sensor_latency: {low: 0, high: 300, nominal: 0}}",
             "key 'simulation.randomization.sensor_latency.high' = 300: should be 0 to longest_latency, 4 periods",

@@ -140,6 +140,13 @@ def test_labels_far_from_optimal_control_fail_the_stage(tmp_path: Path) -> None:
         rg_dataset.run(make_job(tmp_path, recipe))
 
 
+def test_labels_that_nothing_could_check_fail_the_stage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("iowbc.reference.labels.checks.compare_methods", lambda dataset, again: None)
+    recipe = small_recipe(sampling__samples=60, crosscheck__samples=2)
+    with pytest.raises(StageFailed, match=r"optimal control labels none of the 2 samples .* rg\.crosscheck\.samples"):
+        rg_dataset.run(make_job(tmp_path, recipe))
+
+
 @pytest.mark.slow
 def test_optimal_control_alone_labels_a_dataset(tmp_path: Path) -> None:
     job = make_job(tmp_path, small_recipe(method="ocp", sampling__samples=48, feasible__heights=3, feasible__pitches=3))

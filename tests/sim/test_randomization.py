@@ -113,6 +113,14 @@ def test_a_share_of_the_objects_is_light(start):
     assert np.median(mass[light]) == pytest.approx(np.sqrt(0.05 * 0.7), rel=0.3), "evenly in the logarithm"
 
 
+def test_what_is_not_drawn_is_neither_light_nor_slow(start):
+    recipe = changed(changed(Recipe(), "randomization.light_share", 0.5), "randomization.slow_share", 0.5)
+    for name in ("object_mass_scale", "action_latency", "sensor_latency"):
+        recipe = changed(recipe, f"randomization.{name}.enabled", False)
+    drawn = start(recipe, ["lift"] * 40).drawn
+    assert np.ptp(drawn["object_mass"]) == np.ptp(drawn["action_latency"]) == np.ptp(drawn["sensor_latency"]) == 0.0
+
+
 def test_a_share_of_the_episodes_has_both_latencies_long(start):
     def both(recipe):
         drawn = start(recipe, ["lift"] * 400).drawn

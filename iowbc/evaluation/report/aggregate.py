@@ -37,6 +37,12 @@ every suite and with every training; intervals treat them as one cluster."""
 GROUP = ["variant", "kind", "suite", "case", "mass", "impulse"]
 
 
+def case_names(rows: pd.DataFrame) -> "pd.Series[str]":
+    """The case of each row, after its suite where several suites have a case of that name."""
+    suites = rows.groupby("case")["suite"].transform("nunique")
+    return rows["case"].where(suites == 1, rows["suite"] + " " + rows["case"])
+
+
 def aggregate(trials: pd.DataFrame) -> pd.DataFrame:
     """One row per combination of `GROUP`, by suite and case in order of appearance, mass, impulse, and the paper's
     order of variants.
