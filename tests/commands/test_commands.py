@@ -11,13 +11,13 @@ import pandas as pd
 import pytest
 from function_calls import function_calls
 from rich.console import Console
+from sealing import sealed_anew
 
 from iowbc.commands.compare import compare, report
 from iowbc.commands.lookup import open_artifact, points_of
 from iowbc.commands.play import named_source
 from iowbc.errors import UsageError
-from iowbc.files import file_digest
-from iowbc.pipeline.store.artifact import MANIFEST, FileRecord, Manifest, write_manifest
+from iowbc.pipeline.store.artifact import write_manifest
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
 
@@ -154,16 +154,6 @@ def test_compare_shows_only_what_differs_and_by_how_much_and_the_learning_curves
     assert (folder / "runs" / "compare" / "figures" / "learning_teacher.png").read_bytes().startswith(b"\x89PNG")
     assert done.stdout.index("teacher: reward [1/s]") < done.stdout.index("▁█ 3  first")
     assert "▁█ 5  second" in done.stdout
-
-
-def sealed_anew(artifact: Path) -> None:
-    """Let the manifest of an artifact record its files as they are."""
-    manifest = Manifest.model_validate_json((artifact / MANIFEST).read_bytes())
-    files = {
-        name: FileRecord(sha256=file_digest(artifact / name), size=(artifact / name).stat().st_size)
-        for name in manifest.files
-    }
-    write_manifest(artifact, manifest.model_copy(update={"files": files}))
 
 
 def test_gc_removes_what_it_is_told_to_and_nothing_else(folder: Path, command: Command, key: Key) -> None:

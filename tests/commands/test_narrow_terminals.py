@@ -12,6 +12,7 @@ from typing import cast
 
 import pytest
 from rich.console import Console
+from sealing import sealed_anew
 
 from iowbc.commands.compare import compare
 from iowbc.commands.diff import diff
@@ -54,6 +55,7 @@ def measured(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Store:
     for recipe, value in (("first", 0.0123456), ("second", 0.6543219)):
         metrics = {"count": 3.0, LONG: value, f"other_{LONG}": -1e-7 * value}
         Path("runs", recipe, "teacher", "summary.json").write_text(json.dumps({"metrics": metrics}))
+        sealed_anew(Path("runs", recipe, "teacher"))
     return store
 
 
