@@ -64,7 +64,7 @@ class EpisodeState:
     arms: Array
     """θ_I_ref, (n, 14) [rad]."""
     posture: Array
-    """θ_S_ref without the gait prior, (n, 15) [rad]."""
+    """θ_S_ref without the gait prior, until the first step with it, (n, 15) [rad]."""
     support: Array
     """θ_S_ref with the gait prior, (n, 15) [rad]."""
     action: Array
