@@ -240,13 +240,20 @@ def test_trials_are_batched_with_those_that_last_as_long() -> None:
 
 
 def test_films_are_spread_over_the_masses_that_are_held() -> None:
+    kinds = [("lifting", float(mass), trial) for mass in range(9) for trial in range(5)] + [("pushes", 4.0, 0)]
+    cases = {"lifting": "lifting", "pushes": "forward"}
     rows = [
-        {"case": "lifting", "kind": "lifting", "mass": float(mass), "trial": k} for mass in range(9) for k in range(5)
+        {"suite": kind, "case": cases[kind], "kind": kind, "mass": mass, "trial": trial} for kind, mass, trial in kinds
     ]
-    rows.append({"case": "forward", "kind": "pushes", "mass": 4.0, "trial": 0})
     names = {count: [name for name, _ in filmed(pd.DataFrame(rows), count)] for count in (0, 1, 2, 3, 99)}
     assert names[0] == []
     assert names[1] == ["lifting_4kg"]
     assert names[2] == ["lifting_1kg", "lifting_8kg"]
     assert names[3] == ["lifting_1kg", "lifting_5kg", "lifting_8kg"]
     assert len(names[99]) == len(np.unique(names[99])) == 8
+    blocked = [
+        {"suite": suite, "case": "blocked crate", "kind": suite, "mass": 65.0, "trial": 0}
+        for suite in ("stagnation", "compliance")
+    ]
+    found = [name for name, _ in filmed(pd.DataFrame(rows + blocked), 99)]
+    assert found[-2:] == ["stagnation_blocked_crate_65kg", "compliance_blocked_crate_65kg"]
