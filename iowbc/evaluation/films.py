@@ -76,7 +76,8 @@ def filmed(trials: pd.DataFrame, count: int) -> list[tuple[str, "pd.Series[Any]"
     first = first[first["mass"] > 0] if (first["mass"] > 0).any() else first
     ends = (0, len(first) - 1) if count > 1 else ((len(first) - 1) // 2,) * 2
     places = np.linspace(*ends, min(count, len(first))).round().astype(int)
-    rows = [(case_names(first).iloc[place], first.iloc[place]) for place in dict.fromkeys(places.tolist())]
+    names = case_names(first)
+    rows = [(names.iloc[place], first.iloc[place]) for place in dict.fromkeys(places.tolist())]
     return [(f"{case}_{row['mass']:g}kg".translate(NOT_WORD), row) for case, row in rows]
 
 

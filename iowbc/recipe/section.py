@@ -50,6 +50,7 @@ Masses = Annotated[tuple[Annotated[float, Field(ge=0)], ...], AfterValidator(_as
 """Masses [kg] that ascend without repetition."""
 Positive = Annotated[float, Field(gt=0)]
 NonNegative = Annotated[float, Field(ge=0)]
+PositiveRange = Annotated[tuple[PositiveFloat, PositiveFloat], AfterValidator(in_order)]
 NonNegativeRange = Annotated[tuple[NonNegative, NonNegative], AfterValidator(in_order)]
 Width = Annotated[int, Field(gt=0, le=16_384)]
 """Units of a hidden layer."""

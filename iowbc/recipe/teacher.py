@@ -1,13 +1,13 @@
 """PPO with privileged information (paper section III-C, Table I)."""
 
 from collections.abc import Iterator
-from typing import Annotated, Literal
+from typing import Literal
 
-from pydantic import AfterValidator, Field, NonNegativeFloat, PositiveFloat
+from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from iowbc.recipe.evaluation.sequences import DrawnScripts, Segment
 from iowbc.recipe.ppo import PPO
-from iowbc.recipe.section import COSMETIC, DEEPEST, LATER, ArtifactName, Encoder, Section, Width, in_order
+from iowbc.recipe.section import COSMETIC, DEEPEST, LATER, ArtifactName, Encoder, PositiveRange, Section, Width
 from iowbc.recipe.simulation.holding import ObjectScene
 
 STAND_WALK_TURN = (
@@ -118,7 +118,7 @@ class Teacher(PPO):
     """Target KL divergence of an update, between the old and the new policy, in closed form. The learning rate falls by
     a fifth above 1.5 times the target, and rises by a fifth below two thirds of it. At 0.016 a sixth of the samples is
     clipped; at 0.04 a third was, and training was slower. Empty: constant learning rate."""
-    learning_rate_range: Annotated[tuple[PositiveFloat, PositiveFloat], AfterValidator(in_order)] = (2e-5, 1e-3)
+    learning_rate_range: PositiveRange = (2e-5, 1e-3)
     """Smallest and largest learning rate with `desired_kl`."""
     gamma: float = Field(default=0.99, gt=0, lt=1)
     """Discount factor (paper Table I)."""

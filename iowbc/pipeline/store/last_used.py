@@ -138,10 +138,9 @@ def _only_links(folder: Path) -> bool:
 def _record(runs: Runs, recipe: str) -> LastUsed | None:
     """A readable record, or None."""
     try:
-        record = LastUsed.model_validate_json(record_path(runs, recipe).read_bytes())
+        return LastUsed.model_validate_json(record_path(runs, recipe).read_bytes())
     except (OSError, ValueError):
         return None
-    return record
 
 
 def _published(runs: Runs, recipe: str) -> bool:

@@ -1,12 +1,22 @@
 """The skill layer of a recipe: tasks, agents and reward of the Markov game."""
 
 from collections.abc import Iterator
-from typing import Annotated, Literal
+from typing import Literal
 
-from pydantic import AfterValidator, Field, PositiveFloat
+from pydantic import Field
 
 from iowbc.recipe.ppo import PPO
-from iowbc.recipe.section import COSMETIC, DEEPEST, LATER, ArtifactName, Ascending, RecipeFile, Section, Width, in_order
+from iowbc.recipe.section import (
+    COSMETIC,
+    DEEPEST,
+    LATER,
+    ArtifactName,
+    Ascending,
+    PositiveRange,
+    RecipeFile,
+    Section,
+    Width,
+)
 from iowbc.recipe.simulation.holding import ObjectScene
 from iowbc.recipe.simulation.partner import BEHAVIOURS
 from iowbc.recipe.skill.task import Tasks
@@ -52,7 +62,7 @@ class SkillLearning(PPO):
     """Adam's learning rate for the value network."""
     desired_kl: float | None = Field(default=0.012, gt=0)
     """Target KL divergence of a policy update; adapts its learning rate as in `teacher.desired_kl`."""
-    learning_rate_range: Annotated[tuple[PositiveFloat, PositiveFloat], AfterValidator(in_order)] = (1e-5, 1e-3)
+    learning_rate_range: PositiveRange = (1e-5, 1e-3)
     """Smallest and largest learning rate with `desired_kl`."""
     gamma: float = Field(default=0.98, gt=0, lt=1)
     """Discount factor per decision; 0.98 is a horizon of ten seconds at 5 Hz."""
