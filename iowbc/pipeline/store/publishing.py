@@ -19,7 +19,7 @@ LARGEST_FILE = 12_000_000
 """Maximum size of a published file [bytes]; later stages need only a larger one's digest. Training states fit."""
 NEW = ".new"
 """Ending of the folder of an unfinished copy."""
-LARGEST_REPOSITORY = 60_000_000
+LARGEST_REPOSITORY = 45_000_000
 """Maximum size of all published files [bytes], so that cloning stays fast."""
 
 
