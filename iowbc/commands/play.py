@@ -3,6 +3,7 @@
 import contextlib
 import os
 from collections.abc import Mapping
+from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -40,7 +41,9 @@ from iowbc.stages.inputs import policy_stage
 if TYPE_CHECKING:
     from iowbc.evaluation.play import Source
     from iowbc.evaluation.side_by_side import Actor
-    from iowbc.live.game import GameSession
+    from iowbc.learning.networks import TeacherNetwork
+    from iowbc.skill.lower_layer import Student
+    from iowbc.task.specification import Specification
 
 SKILL = "skill"
 
@@ -90,7 +93,12 @@ def play(
         return
     options.require_extra("train", "iowbc play")
     close_on_termination()
-    source = named_source(store, console, word, stage, request.scene)
+    plan = planned(store, word)
+    skill = skill_to_play(store, word, stage, plan)
+    if skill is not None:
+        play_game(store, console, skill, request)
+        return
+    source = named_source(store, console, word, stage, request.scene, plan)
 
     from iowbc.evaluation.play import play as play_episode
 
@@ -125,9 +133,12 @@ def play_on_web(store: Store, console: Console, word: str, stage: str | None, re
     plan = planned(store, word)
     skill = skill_to_play(store, word, stage, plan)
     if skill is not None:
-        from iowbc.live.game import GamePanel
+        from iowbc.live.game import GamePanel, GameRequest, GameSession
 
-        with _game(store, console, skill, request) as game, serving(port) as server:
+        found = _playable_skill(store, skill, request.scene)
+        tell(console, f"skill of {skill.manifest.recipe}: you are its partner")
+        first = GameRequest(found.task, request.seed)
+        with GameSession(found.world, found.student, found.robot, first) as game, serving(port) as server:
             Page(server, game, panel=GamePanel).run(ready)
         return
     source, actor = _driven(store, console, word, stage, plan)
@@ -158,10 +169,46 @@ def skill_to_play(store: Store, word: str, stage: str | None, plan: Planned = Pl
     return None
 
 
-def _game(store: Store, console: Console, skill: Artifact, request: PlayRequest) -> "GameSession":
-    """The games of a skill, beginning with the first task of the requested scene. Raises `UsageError`."""
+def play_game(store: Store, console: Console, skill: Artifact, request: PlayRequest) -> None:
+    """Play a game of a skill in the viewer or as a film, with a human that the skill has not met in training and that
+    alone knows the path. Raises `UsageError`."""
+    from iowbc.skill.game import NOMINAL, ROBOT
+    from iowbc.skill.plan import Plan
+    from iowbc.skill.playing import film_game, show_game
+    from iowbc.skill.single_game import SingleGame
+
+    found = _playable_skill(store, skill, request.scene)
+    partners = found.world.recipe.skill.partners
+    plan = Plan(found.task, [*partners.held_out, *partners.training][0], known=False, seed=request.seed)
+    with closing(SingleGame(found.world, found.student, NOMINAL | {ROBOT: found.robot}, plan)) as game:
+        title = f"{skill.manifest.recipe}: {plan.task}, partner {plan.partner}, seed {request.seed}"
+        tell(console, title)
+        made = ""
+        try:
+            if request.video is None:
+                show_game(game)
+            else:
+                pictures = film_game(game, request.video, title, film_progress(console, request.video))
+                made = f"; {request.video} has {pictures} pictures"
+        except Interrupted as stopped:
+            console.print(str(stopped), markup=False, highlight=False)
+            return
+        tell(console, f"{game.ending.replace('_', ' ')} after {game.seconds:.1f} s{made}")
+
+
+@dataclass(frozen=True)
+class PlayableSkill:
+    """A trained skill, with what it commands, and the task that is played first."""
+
+    world: "Specification"
+    student: "Student"
+    robot: "TeacherNetwork"
+    task: str
+
+
+def _playable_skill(store: Store, skill: Artifact, scene: str) -> PlayableSkill:
+    """A skill and the first task of a scene. Raises `UsageError`."""
     from iowbc.learning.storage import load_teacher
-    from iowbc.live.game import GameRequest, GameSession
     from iowbc.skill.lower_layer import load_student
 
     recipe = Recipe.model_validate(skill.recipe)
@@ -170,11 +217,10 @@ def _game(store: Store, console: Console, skill: Artifact, request: PlayRequest)
         raise UsageError(f"{skill.folder}: this skill read no controller; run its recipe again")
     require_whole(store.runs, [skill, student, *([generator] if generator else [])])
     first = {getattr(recipe.skill.tasks, name).scene: name for name in reversed(recipe.skill.tasks.names)}
-    require_known(request.scene, "scene with a transport task", first)
-    tell(console, f"skill of {skill.manifest.recipe}: you are its partner")
-    robot, asked = load_teacher(skill.folder, "robot")[0], GameRequest(first[request.scene], request.seed)
+    require_known(scene, "scene with a transport task", first)
     world = world_of(skill.recipe, generator).deployed
-    return GameSession(world, load_student(student.folder, world), robot, asked)
+    robot = load_teacher(skill.folder, "robot")[0]
+    return PlayableSkill(world, load_student(student.folder, world), robot, first[scene])
 
 
 def _driven(

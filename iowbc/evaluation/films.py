@@ -22,7 +22,8 @@ from iowbc.evaluation.trials.table import replayed
 from iowbc.evaluation.trials.trace import Outcome
 from iowbc.learning.acting import Policy
 from iowbc.recipe.evaluation.evaluation import Video
-from iowbc.sim.rendering.renderer import SceneRenderer
+from iowbc.sim.rendering.renderer import Line, SceneRenderer
+from iowbc.sim.simulation import Simulation
 from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv
 
@@ -81,6 +82,35 @@ def filmed(trials: pd.DataFrame, count: int) -> list[tuple[str, "pd.Series[Any]"
     return [(f"{case}_{row['mass']:g}kg".translate(NOT_WORD), row) for case, row in rows]
 
 
+class Filming:
+    """Passes frames of the first environment of a simulation to a film when they are due. Close it."""
+
+    def __init__(
+        self, simulation: Simulation, add: Callable[[Frame], None], video: Video, lines: Sequence[Line] = ()
+    ) -> None:
+        """`add`: receives the frames; `lines`: on the ground."""
+        self._simulation, self._add, self._video, self._lines = simulation, add, video, lines
+        self._renderer: SceneRenderer | None = None
+        self.frames = 0
+        """Number of frames so far."""
+
+    def look(self, seconds: float, text: Callable[[], Sequence[str]]) -> None:
+        """Film the state at a time [s] if a frame is due, with lines of text. Raises NoRenderer."""
+        video = self._video
+        if seconds > video.duration or seconds * video.fps < self.frames - 1e-6:
+            return
+        if self._renderer is None:
+            size = {"width": video.width, "height": video.height}
+            self._renderer = SceneRenderer(self._simulation, 0, **size, lines=self._lines)
+        frame = self._renderer.frame()
+        self._add(with_text(frame, text()) if video.traces else frame)
+        self.frames += 1
+
+    def close(self) -> None:
+        if self._renderer is not None:
+            self._renderer.close()
+
+
 def command_line(signals: dict[str, Any], seconds: float) -> str:
     """Time and command of the first environment, in words."""
     forward, left, turn = signals["commanded_velocity"][0]
@@ -104,25 +134,12 @@ def film_episode(
     `title`: text in every frame, above the line with time and command; `progress` receives the time reached [s]. Raises
     Interrupted when interrupted, NoRenderer if rendering is not possible.
     """
-    renderer: SceneRenderer | None = None
-    frames = 0
+    with closing(Filming(environment.batch.simulation, add, video)) as filming:
 
-    def look(seconds: float) -> None:
-        nonlocal renderer, frames
-        if seconds > video.duration or seconds * video.fps < frames - 1e-6:
-            return
-        if renderer is None:
-            renderer = SceneRenderer(environment.batch.simulation, 0, width=video.width, height=video.height)
-        frame = renderer.frame()
-        add(with_text(frame, [title, command_line(environment.signals, seconds)]) if video.traces else frame)
-        frames += 1
+        def look(seconds: float) -> None:
+            filming.look(seconds, lambda: [title, command_line(environment.signals, seconds)])
 
-    try:
-        outcome = play_in(environment, policy, interrupted, progress, look)[0]
-    finally:
-        if renderer is not None:
-            renderer.close()
-    return outcome, frames
+        return play_in(environment, policy, interrupted, progress, look)[0], filming.frames
 
 
 def film_trial(

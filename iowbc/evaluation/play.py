@@ -3,8 +3,8 @@
 import os
 import sys
 import time
-from collections.abc import Callable
-from contextlib import closing, nullcontext
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing, contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -24,6 +24,8 @@ from iowbc.recipe.evaluation.evaluation import Evaluation
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import load_robot
 from iowbc.sim.rendering.appearance import Appearance
+from iowbc.sim.rendering.renderer import Line, add_lines
+from iowbc.sim.simulation import Simulation
 from iowbc.task.episodes import Episode
 from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv
@@ -81,7 +83,8 @@ def play(
     with closing(source.environment(episode)) as environment:
         policy = open_policy(source, environment)
         if request.video is None:
-            return episode, play_in_viewer(environment, policy, interrupted), 0
+            with in_window(environment.batch.simulation) as look:
+                return episode, play_in(environment, policy, interrupted, look=look)[0], 0
         settings = request.video_settings or recipe.eval.video.model_copy(update={"duration": episode.duration})
         title = f"{recipe.name}: {episode.scene}, {request.object_mass:g} kg, seed {request.seed}"
         with written_film(request.video, settings.fps) as add:
@@ -123,13 +126,18 @@ def require_display() -> None:
         )
 
 
-def play_in_viewer(environment: VectorEnv, policy: Policy, interrupted: Callable[[], bool]) -> Outcome:
-    """One episode in real time in a window. Raises Interrupted when the window is closed."""
+@contextmanager
+def in_window(simulation: Simulation, lines: Sequence[Line] = ()) -> Iterator[Callable[[float], None]]:
+    """A window that shows the first environment of a simulation, with lines on the ground, until the block ends. Yields
+    a function that shows the present state and waits until a time [s] since the start; it raises Interrupted when the
+    window is closed."""
     import mujoco.viewer  # needs a window system as soon as it is imported
 
-    appearance = Appearance(environment.batch.simulation, 0)
+    appearance = Appearance(simulation, 0)
     data = appearance.data
     with mujoco.viewer.launch_passive(appearance.model, data, show_left_ui=False, show_right_ui=False) as viewer:
+        with viewer.lock():
+            add_lines(viewer.user_scn, lines)
         start = time.monotonic()
 
         def look(seconds: float) -> None:
@@ -141,4 +149,4 @@ def play_in_viewer(environment: VectorEnv, policy: Policy, interrupted: Callable
             viewer.sync()
             time.sleep(max(0.0, start + seconds - time.monotonic()))
 
-        return play_in(environment, policy, interrupted, look=look)[0]
+        yield look

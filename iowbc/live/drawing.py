@@ -12,6 +12,7 @@ from iowbc.live.moment import Moment
 from iowbc.live.shapes import BodyMesh, collision_shapes, looks
 from iowbc.robot.description import Robot
 from iowbc.sim.rendering.forces import ARROW_RADIUS, COLOURS
+from iowbc.sim.rendering.renderer import Line
 
 View = tuple[tuple[float, ...], tuple[float, ...]]
 VIEW: View = ((1.7, -1.4, 1.2), (0.1, 0.0, 0.6))
@@ -48,8 +49,8 @@ class ShownParts:
 class GameMarks:
     """Path, walls and handle of a game, drawn once per model."""
 
-    lines: tuple[tuple[Array, tuple[float, ...]], ...]
-    """The path and its walls: points (k, 3) [m], world frame, with a colour."""
+    lines: tuple[Line, ...]
+    """The path and its walls."""
     handle: Array
     """The far handle, frame of the object, (3,) [m]."""
 

@@ -18,23 +18,16 @@ from iowbc.live.panel import LAST_SEED, Button, ControlPanel, table_row
 from iowbc.live.track import PAST, WINDOW, Played, Track, track_of
 from iowbc.robot import rotations
 from iowbc.sim.rendering.forces import Force
-from iowbc.skill.batch import GameBatch
-from iowbc.skill.game import COUNTED, NOMINAL, TransportGame
+from iowbc.skill.game import NOMINAL
 from iowbc.skill.lower_layer import Student
 from iowbc.skill.plan import PERSON, Plan, Rule
-from iowbc.skill.situation import turned
-from iowbc.skill.trained import mean_actions
+from iowbc.skill.single_game import SingleGame
 from iowbc.task.specification import Specification
 
 TIME_LIMIT = 600.0
 """Time limit of a game [s], long because a person first explores the controls."""
 ROBOTS: dict[str, Rule | None] = {"skill": None, "admittance follower": "follow", "stands": "stand"}
 """Robots that a person can compare: the trained skill, and the rule of one without."""
-PATH, WALL = (0.1, 0.35, 0.8, 1.0), (0.55, 0.2, 0.15, 1.0)
-HEIGHT = 0.01
-"""Height of lines above the ground [m]."""
-EVERY = 4
-"""Every how many points of a path its line has a corner: 0.2 m."""
 
 
 @dataclass(frozen=True)
@@ -64,44 +57,35 @@ class GameSession(Played):
         self._open(request)
 
     def _open(self, request: GameRequest) -> None:
-        plan = Plan(request.task, PERSON, known=False, seed=request.seed, rule=ROBOTS[request.robot])
-        self.request, self._game = request, TransportGame(self.world, self._student, n=1, plans=(plan,))
-        self._lower = self._game.batch.lower
+        rule = ROBOTS[request.robot]
+        plan = Plan(request.task, PERSON, known=False, seed=request.seed, rule=rule)
+        networks = NOMINAL | {"robot": self._skill if rule is None else None}
+        self.request, self._game = request, SingleGame(self.world, self._student, networks, plan)
+        self._lower = self._game.lower
         self.robot, self.period = self._lower.robot, self._lower.period
         self._recorder: MomentRecorder | None = None
         self._signals = {name: np.zeros((1, 1)) for name in ("covered", "length", "lateral", "share")}
         self.reset()
 
     def reset(self) -> None:
-        self._seen = self._game.reset()
+        self._game.reset()
         batch, state = self._game.batch, self._lower.simulation.state
-        self._steps, self._grip, batch.hand[:] = 0, None, np.nan
+        self._grip, batch.hand[:] = None, np.nan
         away = self._lower.simulation.partner.at - state.object_position
         handle = rotations.rotate_inverse(state.object_quaternion, away)[0]
-        self.marks = GameMarks(tuple(_path_lines(batch)), handle)
+        self.marks = GameMarks(self._game.lines(), handle)
         self._recorder = self._recorder or MomentRecorder(self._lower, self._signals)
-        mass = self._lower.simulation.drawn["object_mass"][0]
-        title = f"{self.request.task}, {mass:.0f} kg"
+        title = f"{self.request.task}, {self._game.mass:.0f} kg"
         self.track = track_of(self._recorder, self.world, title, round(PAST / self.period))
         self.track.moments.append(self._look())
 
     def step(self) -> None:
         if self.track.ending:
             return
-        batch = self._game.batch
-        if self._steps % batch.substeps == 0:
-            networks = NOMINAL | {"robot": self._skill if ROBOTS[self.request.robot] is None else None}
-            self._game.act(mean_actions(networks, self._seen.observations, self._game.action_sizes))
-            batch.decide()
-        batch.control()
-        self._steps += 1
+        self._game.control()
         self.track.moments.append(self._look())
-        if self._steps % batch.substeps == 0:
-            batch.finish_decision()
-            outcome = self._game.outcome()
-            self._seen = outcome.observed
-            if outcome.terminated[0] or outcome.truncated[0]:
-                self.track.ending = next((name for name in COUNTED[:-1] if outcome.figures[name][0]), "touched")
+        self._game.judge()
+        self.track.ending = self._game.ending
 
     def drag(self, drags: Sequence[Drag]) -> None:
         """Leads the hand at the handle to the pointer: on its level, and upward with the shift key. The newest drag
@@ -130,7 +114,7 @@ class GameSession(Played):
         signals["covered"][:], signals["length"][:] = now.covered, now.covered + now.left
         signals["lateral"][:], signals["share"][:] = now.lateral, force[2]
         assert self._recorder is not None
-        moment = self._recorder.look(self._steps * self.period)
+        moment = self._recorder.look(self._game.seconds)
         pull = Force("partner", simulation.partner.at[0], force * [1.0, 1.0, 0.0])
         others = tuple(force for force in moment.forces if force.kind != "partner")
         return replace(moment, forces=(pull, *others))
@@ -182,16 +166,3 @@ class GamePanel(ControlPanel):
         ]
         body = "".join(table_row(*row) for row in rows)
         return f"<div style='padding:0 1em;font-size:0.8em'><table>{body}</table></div>"
-
-
-def _path_lines(batch: GameBatch) -> list[tuple[Array, tuple[float, ...]]]:
-    """The path of the first game and its walls in the world, points (k, 3) [m] with a colour each."""
-    points, walls = batch.paths.outline(int(batch.drawn.task[0]))
-    lines = [(points[::EVERY], PATH)]
-    for wall in walls:
-        present = np.isfinite(wall[:, 0])
-        pieces = np.split(np.arange(len(wall)), np.flatnonzero(np.diff(present)) + 1)
-        lines += [(wall[piece][[*range(0, len(piece), EVERY), -1]], WALL) for piece in pieces if present[piece[0]]]
-    heading, start = batch.origin.heading[0], batch.origin.position[0, :2]
-    moved = [(turned(line, np.full(len(line), heading)) + start, colour) for line, colour in lines]
-    return [(np.column_stack([line, np.full(len(line), HEIGHT)]), colour) for line, colour in moved]

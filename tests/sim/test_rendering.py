@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 
+import mujoco
 import numpy as np
 import pytest
 from stepping import run
@@ -12,6 +13,7 @@ from iowbc.recipe.simulation.simulation import SimulationSettings as Recipe
 from iowbc.sim.rendering import appearance as look
 from iowbc.sim.rendering import backend as headless
 from iowbc.sim.rendering.forces import COLOURS, SMALLEST_FORCE
+from iowbc.sim.rendering.offscreen import MARGIN
 from iowbc.sim.rendering.renderer import SceneRenderer
 
 
@@ -38,6 +40,28 @@ def test_the_camera_follows_the_robot(start, monkeypatch):
         for _ in range(60):
             renderer.frame()
         assert renderer.camera.lookat[0] > before[0] + 9.0
+
+
+def test_the_camera_sees_the_robot_from_its_side_whatever_its_heading(start, calm, monkeypatch):
+    monkeypatch.setattr(look, "installed_meshes", lambda robot: iter(()))
+    azimuths = []
+    for yaw in (0.0, 1.0):
+        simulation = start(calm, ["push"], start_yaw=yaw)
+        with SceneRenderer(simulation, 0, width=64, height=48) as renderer:
+            azimuths.append(np.radians(renderer.camera.azimuth) - yaw)
+    np.testing.assert_allclose(azimuths[1], azimuths[0], atol=1e-6)
+
+
+def test_lines_are_drawn_on_the_ground_as_far_as_there_is_room(start, monkeypatch):
+    monkeypatch.setattr(look, "installed_meshes", lambda robot: iter(()))
+    simulation = start(Recipe(), ["free"])
+    for points in (3, 2 * MARGIN):
+        line = np.zeros((points, 3)), (1.0, 0.0, 0.0, 1.0)
+        with SceneRenderer(simulation, 0, width=64, height=48, lines=[line]) as renderer:
+            renderer.frame()
+            kinds = [geom.type for geom in renderer.scene.geoms[: renderer.scene.ngeom]]
+            assert kinds.count(mujoco.mjtGeom.mjGEOM_CAPSULE.value) >= 2
+            assert renderer.scene.ngeom <= renderer.scene.maxgeom
 
 
 def test_forces_are_drawn_as_arrows(start, monkeypatch):

@@ -12,8 +12,8 @@ from iowbc.sim.rendering.backend import context
 
 Image = NDArray[np.uint8]
 
-MARGIN = 200
-"""Number of geoms reserved for arrows."""
+MARGIN = 400
+"""Number of geoms reserved for arrows and lines."""
 
 
 class Offscreen:

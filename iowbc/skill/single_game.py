@@ -1,0 +1,94 @@
+"""One game in this process, advanced by control steps: for a person who plays it, a window and a film."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from iowbc.learning.networks import TeacherNetwork
+from iowbc.sim.rendering.renderer import Line
+from iowbc.skill.game import COUNTED, TransportGame
+from iowbc.skill.lower_layer import Student
+from iowbc.skill.plan import Plan
+from iowbc.skill.situation import turned
+from iowbc.skill.trained import mean_actions
+from iowbc.task.specification import Specification
+
+PATH, WALL = (0.1, 0.35, 0.8, 1.0), (0.55, 0.2, 0.15, 1.0)
+HEIGHT = 0.01
+"""Height of lines above the ground [m]."""
+EVERY = 4
+"""Every how many points of a path its line has a corner: 0.2 m."""
+
+
+class SingleGame:
+    """One game. Begin it with `reset`, and close it."""
+
+    def __init__(
+        self,
+        world: Specification,
+        student: Student,
+        networks: Mapping[str, TeacherNetwork | None],
+        plan: Plan,
+    ) -> None:
+        """`networks`: policies of the agents, see `mean_actions`. Raises UsageError for an unknown task."""
+        self._game, self._networks = TransportGame(world, student, n=1, plans=(plan,)), networks
+        self.recipe = world.recipe
+        self.duration = self._game.setup.tasks[plan.task].duration
+        """Time limit [s]."""
+        self.batch = self._game.batch
+        self.lower = self.batch.lower
+        self.period = self.lower.period
+        """Control period [s]."""
+        self.steps = 0
+        """Control steps since the beginning."""
+        self.ending = ""
+        """Reason of the game's end; empty before it."""
+
+    @property
+    def seconds(self) -> float:
+        """Time since the beginning [s]."""
+        return self.steps * self.period
+
+    @property
+    def mass(self) -> float:
+        """Mass of the object [kg]."""
+        return float(self.lower.simulation.drawn["object_mass"][0])
+
+    def reset(self) -> None:
+        """Begins the game anew, with the same draws."""
+        self._seen = self._game.reset()
+        self.steps, self.ending = 0, ""
+
+    def control(self) -> None:
+        """One control step, and the decision before it where one is due."""
+        if self.steps % self.batch.substeps == 0:
+            self._game.act(mean_actions(self._networks, self._seen.observations, self._game.action_sizes))
+            self.batch.decide()
+        self.batch.control()
+        self.steps += 1
+
+    def judge(self) -> None:
+        """After each control step: observe, and end the game, where a decision is complete. An ended game restarts."""
+        if self.steps % self.batch.substeps:
+            return
+        self.batch.finish_decision()
+        outcome = self._game.outcome()
+        self._seen = outcome.observed
+        if outcome.terminated[0] or outcome.truncated[0]:
+            self.ending = next((name for name in COUNTED[:-1] if outcome.figures[name][0]), "touched")
+
+    def lines(self) -> tuple[Line, ...]:
+        """The path and its walls, on the ground."""
+        batch = self.batch
+        points, walls = batch.paths.outline(int(batch.drawn.task[0]))
+        lines = [(points[::EVERY], PATH)]
+        for wall in walls:
+            present = np.isfinite(wall[:, 0])
+            pieces = np.split(np.arange(len(wall)), np.flatnonzero(np.diff(present)) + 1)
+            lines += [(wall[piece][[*range(0, len(piece), EVERY), -1]], WALL) for piece in pieces if present[piece[0]]]
+        heading, start = batch.origin.heading[0], batch.origin.position[0, :2]
+        moved = [(turned(line, np.full(len(line), heading)) + start, colour) for line, colour in lines]
+        return tuple((np.column_stack([line, np.full(len(line), HEIGHT)]), colour) for line, colour in moved)
+
+    def close(self) -> None:
+        self._game.close()
