@@ -26,7 +26,7 @@ from iowbc.learning.history_actor import student_architecture
 from iowbc.learning.networks import Mirrors, mirrors_as_json
 from iowbc.learning.normalization import Normalization
 from iowbc.learning.policy import ActorCritic
-from iowbc.learning.rollout import Samples, neighbours
+from iowbc.learning.rollout import Samples
 from iowbc.learning.symmetry import half_mirrored, mirror_images
 from iowbc.recipe.skill.skill import SkillLearning
 from iowbc.recipe.teacher import Teacher
@@ -145,7 +145,6 @@ class Learner:
         columns["observation"].copy_(prepared.view(*shape, -1))
         columns["action"].copy_(self._tensor(found.action))
         self.in_parallel(self._judge, samples.flat)
-        columns["neighbours"].copy_(neighbours(columns["mean"], found.ended))
         steps = zip(found.reward, found.ended, strict=True)
         rewards = np.stack([self.normalization.reward(reward, ended) for reward, ended in steps])
         behind = np.concatenate([found.observation[-1], found.cut_observation])
@@ -247,9 +246,6 @@ class Learner:
         policy_loss = -torch.min(advantage * ratio, advantage * clipped).mean()
         value_loss = torch.nn.functional.mse_loss(value, samples["target"])
         loss = policy_loss + settings.value_weight * value_loss - settings.entropy * entropy(log_std)
-        if settings.smoothness:
-            std = log_std.detach()  # smoothness must come from the mean, not from more noise
-            loss = loss + settings.smoothness * divergence(samples["neighbours"], std, mean, std).mean()
         with torch.no_grad():
             kl = divergence(samples["mean"], before, mean, log_std).mean()
             sampled = (ratio - 1.0 - difference).mean()

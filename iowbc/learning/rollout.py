@@ -15,14 +15,14 @@ SINGLE = ("log_density", "value", "advantage", "target")
 class Samples:
     """Samples of T steps of n environments as rows, so that an epoch shuffles them with a single gather.
 
-    `columns` are views of the rows by name: prepared observation, action, the policy's mean, mean of its neighbours in
-    time, log density and value before the update, advantage and value target. Each rollout overwrites the previous one.
+    `columns` are views of the rows by name: prepared observation, action, the policy's mean, log density and
+    value before the update, advantage and value target. Each rollout overwrites the previous one.
     """
 
     def __init__(
         self, steps: int, environments: int, observation: int, actions: int, device: torch.device | None = None
     ) -> None:
-        acting = dict.fromkeys(("action", "mean", "neighbours"), actions)
+        acting = dict.fromkeys(("action", "mean"), actions)
         sizes = {"observation": observation, **acting, **dict.fromkeys(SINGLE, 1)}
         ends = np.cumsum(list(sizes.values())).tolist()
         self.places = {name: slice(end - size, end) for (name, size), end in zip(sizes.items(), ends, strict=True)}
@@ -45,18 +45,6 @@ class Samples:
         found = advantages(rewards, ended, values, last_value, discount, decay)
         self.columns["advantage"].copy_(torch.from_numpy(found))
         self.columns["target"].copy_(torch.from_numpy(found + values))
-
-
-def neighbours(means: Tensor, ended: Mask) -> Tensor:
-    """Average of the policy's means one step before and after, (T, n, A).
-
-    At the ends of rollout and episodes, the mean itself. means: (T, n, A); ended: (T, n), where an episode ended with
-    the step.
-    """
-    found, goes_on = means.clone(), torch.from_numpy(~ended).to(means.device)
-    inside = (goes_on[:-2] & goes_on[1:-1])[..., None]
-    found[1:-1] = torch.where(inside, 0.5 * (means[:-2] + means[2:]), means[1:-1])
-    return found
 
 
 def advantages(rewards: Array, ended: Mask, values: Array, last_value: Array, discount: float, decay: float) -> Array:

@@ -29,8 +29,7 @@ def mirror_images(samples: Samples, policy: ActorCritic, mirrors: Mirrors, gap: 
     old, new = samples.named(rows), samples.named(images)
     with torch.no_grad():
         new["observation"].copy_(mirror_tensor(mirrors[0], old["observation"]))
-        for name in ("action", "neighbours"):
-            new[name].copy_(mirror_tensor(mirrors[1], old[name]))
+        new["action"].copy_(mirror_tensor(mirrors[1], old["action"]))
         new["mean"].copy_(policy.actor.head(policy.actor.hidden(new["observation"])))
         new["log_density"].copy_(log_density(new["action"], new["mean"], policy.log_std))
     unlikely = new["log_density"] < old["log_density"] - gap

@@ -7,7 +7,7 @@ import itertools
 import re
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import (
     AfterValidator,
@@ -21,6 +21,8 @@ from pydantic import (
 from pydantic.fields import FieldInfo
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
+
+from iowbc.errors import shown
 
 COSMETIC: dict[str, Any] = {"cosmetic": True}
 """Marks a field that changes how a stage is run or shown, but none of its results; it is not part of the key."""
@@ -69,6 +71,9 @@ class Section(BaseModel):
     """Immutable part of a recipe; unknown keys are an error."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    withdrawn: ClassVar[Mapping[str, Any]] = {}
+    """Fields of an earlier version that entered no key, with the value whose behaviour remains; resolved recipes of
+    artifacts still give that value."""
 
     @property
     def idle(self) -> bool:
@@ -78,6 +83,17 @@ class Section(BaseModel):
     def problems(self) -> Iterator[tuple[str, str]]:
         """Inconsistent values: pairs of a dotted path relative to this section (empty: itself) and a message."""
         return iter(())
+
+    @model_validator(mode="before")
+    @classmethod
+    def _without_withdrawn(cls, given: Any) -> Any:
+        """The values without withdrawn fields. Raises ValueError for one with another value."""
+        if not isinstance(given, Mapping) or not cls.withdrawn.keys() & given.keys():
+            return given
+        for name, value in cls.withdrawn.items():
+            if given.get(name, value) != value:
+                raise ValueError(f"{name} was withdrawn; its behaviour is that of {shown(value)}: remove it")
+        return {name: value for name, value in given.items() if name not in cls.withdrawn}
 
     @model_validator(mode="after")
     def _check_consistency(self) -> Self:

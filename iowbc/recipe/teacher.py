@@ -1,7 +1,7 @@
 """PPO with privileged information (paper section III-C, Table I)."""
 
-from collections.abc import Iterator
-from typing import Literal
+from collections.abc import Iterator, Mapping
+from typing import Any, ClassVar, Literal
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
@@ -103,6 +103,8 @@ class Restart(Section):
 class Teacher(PPO):
     """PPO with privileged information."""
 
+    withdrawn: ClassVar[Mapping[str, Any]] = {"smoothness": 0.0}
+
     steps: int = Field(default=30_000_000, ge=1, le=10**12)
     """Environment steps of the training, summed over the environments. No schedule depends on them: a recipe that only
     increases this number resumes from the finished training."""
@@ -122,10 +124,6 @@ class Teacher(PPO):
     """Smallest and largest learning rate with `desired_kl`."""
     gamma: float = Field(default=0.99, gt=0, lt=1)
     """Discount factor (paper Table I)."""
-    smoothness: float = Field(default=0.0, ge=0, json_schema_extra=LATER)
-    """Weight of the KL divergence between the policy and the average of its actions one step before and after: a cost
-    on the action's squared second difference. Unlike a smoothness reward, it excludes exploration noise, whose jitter
-    outweighs the policy's own (temporal smoothness of CAPS, Mysore et al. 2021)."""
     value_weight: float = Field(default=0.5, ge=0)
     """Weight of the value loss."""
     initial_std: float = Field(default=0.5, gt=0)

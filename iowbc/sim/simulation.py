@@ -1,6 +1,5 @@
 """n environments stepped in one process: worlds, partner, disturbances, randomisation and sensors."""
 
-from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -17,7 +16,6 @@ from iowbc.robot.description import GRAVITY, Robot
 from iowbc.robot.rotations import TINY
 from iowbc.sim import partner
 from iowbc.sim.disturbance import Disturbance
-from iowbc.sim.divergence import Divergence
 from iowbc.sim.drives import Drives
 from iowbc.sim.episode_draws import Draws
 from iowbc.sim.sensing import Sensing
@@ -112,7 +110,6 @@ class Simulation:
         self._handover = handover / self.period
         width = self._sensing.noise_width + partner.NOISE_WIDTH
         self._noise = np.zeros((n, width + width % 2))
-        self.divergences: deque[Divergence] = deque(maxlen=recipe.physics.divergences_kept)
 
     @property
     def infeasible(self) -> NDArray[np.bool_]:
@@ -220,9 +217,7 @@ class Simulation:
             place = world.place
             failed = diverged[place]
             world.step(given.rows(place), failed)
-            if failed.any():
-                diverged[place] = failed
-                self._keep_divergences(world, np.flatnonzero(failed), given)
+            diverged[place] = failed
             world.gather(state)
             world.release(state, drawn["slip_force"])
         state.joint_acceleration[:] = (state.joint_velocity - speed) / self.period
@@ -266,20 +261,6 @@ class Simulation:
         holds it, else what friction needs for the palms' part of their last load."""
         needed = self._by_friction * self._borne / np.maximum(self.drawn["surface_friction"], TINY)
         return self._pressed + np.minimum(needed, self._strength)
-
-    def _keep_divergences(self, world: World, ids: Indices, given: Period) -> None:
-        for index in ids:
-            row = int(world.rows[index])
-            arrays = world.record(int(index)) | {name: values[row] for name, values in vars(given).items()}
-            self.divergences.append(
-                Divergence(
-                    scene=self.scene_names[row],
-                    environment=int(self.envs[row]),
-                    episode=int(self.episode[row]),
-                    step=int(self.clock[row]),
-                    arrays={name: values.copy() for name, values in arrays.items()},
-                )
-            )
 
     def _memory(self) -> dict[str, Array]:
         """State arrays, without those of the worlds."""

@@ -231,11 +231,6 @@ class World:
         self.batch.forward(ids)
         self._keep(ids)
 
-    def record(self, index: int) -> dict[str, Array]:
-        """State row and model fields of a simulation at the start of the last control period."""
-        kept = {name: values[index] for name, values in self._memory.items()}
-        return kept | {"state": self.before[index]} | self.fields.of(index)
-
     def release(self, state: SimulationState, slip_force: Array) -> None:
         """Releases hands whose grip carried more than its slip force, (all environments,) [N], at any physics step of
         the period."""

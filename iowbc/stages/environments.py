@@ -1,8 +1,5 @@
 """The environments of a training: in worker processes here, or in groups on other machines, with the same rollouts."""
 
-import secrets
-import shutil
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -28,14 +25,14 @@ WRITTEN = ("action", "counters", "terms")
 """Buffers that the learner also writes: actions, and statistics that it resets after reading."""
 
 
-def training_environments(job: Job, *, count: int, seed: int, divergences: Path | None = None) -> VectorEnv:
-    """The environments of a job's recipe, here or on `rollout_actors`. `divergences`: see `VectorEnv`."""
+def training_environments(job: Job, *, count: int, seed: int) -> VectorEnv:
+    """The environments of a job's recipe, here or on `rollout_actors`."""
     world = Specification(job.recipe, job.robot, job.inputs.get("rg-fit"))
     actors = job.recipe.execution.rollout_actors
     workers: int | Callable[[Setup], Workers] = job.workers
     if actors is not None and job.spread is not None:
         workers = partial(RemoteWorkers, job.spread, min(actors, job.spread.width))
-    return VectorEnv(world, num_envs=count, workers=workers, seed=seed, divergences=divergences)
+    return VectorEnv(world, num_envs=count, workers=workers, seed=seed)
 
 
 class RemoteWorkers(Workers):
@@ -47,7 +44,6 @@ class RemoteWorkers(Workers):
         folders = {"robot": world.robot} | ({} if world.rg is None else {"generator": world.rg})
         self.groups = shares_in_blocks(setup.count, count)
         self.buffers = private_buffers(setup.buffer_fields(), setup.count)
-        self._divergences = setup.divergences
         self._pool = spread.actor_pool(ACTOR, RolloutActor, [(setup, *group) for group in self.groups], folders)
         self._changes = True
 
@@ -65,12 +61,7 @@ class RemoteWorkers(Workers):
             for group, state in zip(self.groups, self._pool.states, strict=True):
                 for name, values in self.buffers.rows(*group).arrays.items():
                     values[:] = state[f"buffer/{name}"]
-        for _, files in found:
-            for name, content in files.items():
-                assert self._divergences is not None
-                self._divergences.mkdir(parents=True, exist_ok=True)
-                (self._divergences / name).write_bytes(content)
-        return [answer for answer, _ in found]
+        return found
 
     def close(self) -> None:
         self._pool.close()
@@ -81,22 +72,15 @@ class RolloutActor:
 
     def __init__(self, setup: Setup, first: int, last: int, *, robot: Path, generator: Path | None = None) -> None:
         world = Specification(setup.specification.recipe, robot, generator)
-        self._kept = Path(tempfile.gettempdir(), f"iowbc-divergences-{secrets.token_hex(8)}")
-        folder = None if setup.divergences is None else self._kept
-        here = replace(setup, specification=world, divergences=folder)
+        here = replace(setup, specification=world)
         self._batch = here.batch(first, last, private_buffers(here.buffer_fields(), last - first))
 
-    def ask(self, message: tuple[Mapping[str, Array], Message]) -> tuple[Any, dict[str, bytes]]:
-        """The answer of the batch, and the files of simulations that have diverged meanwhile. `message`: rows of the
-        buffers in `WRITTEN`, and the message to the batch."""
+    def ask(self, message: tuple[Mapping[str, Array], Message]) -> Any:
+        """The answer of the batch. `message`: rows of the buffers in `WRITTEN`, and the message to the batch."""
         written, own = message
         for name, values in written.items():
             self._batch.buffers[name][:] = values
-        answer = own.carry_out(self._batch)
-        files = {path.name: path.read_bytes() for path in sorted(self._kept.glob("*"))}
-        if files:
-            shutil.rmtree(self._kept)
-        return answer, files
+        return own.carry_out(self._batch)
 
     def state(self) -> dict[str, Any]:
         return self._batch.snapshot()

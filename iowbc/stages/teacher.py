@@ -81,9 +81,7 @@ def run(job: Job) -> None:
     seed = recipe.seed if settings.seed is None else settings.seed
     world = Specification(recipe, job.robot, job.inputs.get("rg-fit"))
     with ExitStack() as open_ones:
-        environments = training_environments(
-            job, count=settings.environments, seed=seed, divergences=job.work / "divergences"
-        )
+        environments = training_environments(job, count=settings.environments, seed=seed)
         open_ones.enter_context(closing(environments))
         score, films = None, None
         if settings.check.every is not None:
@@ -114,9 +112,8 @@ def run(job: Job) -> None:
     network, architecture = training.network()
     save_network(network, architecture, job.out, "teacher", about)
     training.model.save_for_sb3(job.out / "teacher_sb3.zip")
-    for name in ("divergences", VIDEOS):
-        if (job.work / name).is_dir():
-            (job.work / name).rename(job.out / name)
+    if (job.work / VIDEOS).is_dir():
+        (job.work / VIDEOS).rename(job.out / VIDEOS)
     terms = sorted({name for row in curves.rows for name in row if name.startswith(("level/", "falls/", "reward/"))})
     figures = curves.write_artifact(job.out, f"{recipe.name}: teacher", PANELS, terms)
     kept = {"best_score": training.best.score} if settings.check.every is not None else {}

@@ -1,7 +1,6 @@
 """The environments of one process, stepped as arrays: simulation, guidance, judgement, observation."""
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +27,6 @@ from iowbc.task.record.recorder import (
     count_endings,
     count_pushes,
     count_step,
-    keep_divergences,
     write_signals,
     write_trial_signals,
 )
@@ -49,12 +47,10 @@ class Batch:
         seed: int,
         buffers: Buffers,
         episodes: Sequence[Episode] | None = None,
-        divergences: Path | None = None,
     ) -> None:
         """`environments`: global indices, (n,); `scenes`: their scenes, by name.
 
-        `episodes`: one per environment; None draws them as in training. `divergences`: folder in which diverged
-        simulations are kept for replay.
+        `episodes`: one per environment; None draws them as in training.
         """
         recipe, task = specification.recipe, specification.recipe.task
         self.robot, self.buffers = load_robot(specification.robot), buffers
@@ -88,7 +84,6 @@ class Batch:
         arms = None if recipe.eval.public is None else recipe.eval.public.arms
         self._own_arms = np.flatnonzero([arms == "own" or (arms == "free" and name == FREE) for name in scenes])
         """Environments in which a public controller moves its arms, (k,)."""
-        self._divergences = divergences
 
     def targets(self, action: Array) -> Array:
         """Joint targets of an action (n, 15) in the next step, (n, joints) [rad]."""
@@ -170,7 +165,6 @@ class Batch:
         buffers["episode_length"][which] = memory.steps[which]
         count_endings(buffers, ending, self._schedule.causes(ending), which)
         self._schedule.promote(ending, which)
-        keep_divergences(self.simulation.divergences, self._divergences)
         self._observe(self.begin(which), which)
 
     def begin(self, which: Indices) -> Motion:

@@ -4,7 +4,7 @@ import numpy as np
 import torch
 
 from iowbc.learning.gaussian import divergence, entropy, log_density
-from iowbc.learning.rollout import advantages, neighbours
+from iowbc.learning.rollout import advantages
 
 
 def column(*values: float) -> np.ndarray:
@@ -58,10 +58,3 @@ def test_density_entropy_and_divergence_are_those_of_torch() -> None:
 def test_the_closed_form_does_not_depend_on_which_actions_were_drawn() -> None:
     mean, other, log_std = torch.zeros(1, 2), torch.tensor([[0.1, 0.0]]), torch.full((2,), math.log(0.5))
     assert math.isclose(float(divergence(mean, log_std, other, log_std)), 0.01 / (2 * 0.25), rel_tol=1e-5)
-
-
-def test_neighbours_in_time_are_those_of_one_episode() -> None:
-    means = torch.tensor([0.0, 1.0, 4.0, 9.0, 16.0, 25.0])[:, None, None]
-    ended = np.array([False, False, True, False, False, False])[:, None]
-    found = neighbours(means, ended)[:, 0, 0].tolist()
-    assert found == [0.0, 2.0, 4.0, 9.0, 17.0, 25.0], "its own at both ends, and where the episode ends with the step"

@@ -184,7 +184,6 @@ def test_samples_are_shown_or_their_whole_images_but_no_image_that_is_too_unlike
     images = mirror_images(rollout, policy, (OBSERVATION, ACTION), gap=3.0)
     new = rollout.named(images)
     torch.testing.assert_close(new["action"][:1], image)
-    torch.testing.assert_close(new["neighbours"][:1], mirror_tensor(ACTION, old["neighbours"][0]))
     torch.testing.assert_close(new["log_density"][:1], there.reshape(1), rtol=1e-4, atol=1e-4)
     torch.testing.assert_close(new["advantage"][:1], old["advantage"][0])
     torch.testing.assert_close(images[1], rollout.flat[1])

@@ -45,16 +45,6 @@ def test_a_resumed_training_ends_bit_for_bit_where_an_unbroken_one_does(symmetry
 
 
 @pytest.mark.parametrize("symmetry", ["construction", "none"])
-def test_a_smoothness_weight_makes_the_mean_action_smoother(symmetry: Any) -> None:
-    found = []
-    for weight in (0.0, 1.0):
-        some = finish(training(symmetry=symmetry, smoothness=weight, steps=16 * 8 * 20))
-        means = some.model.samples.columns["mean"]
-        found.append(float((means - some.model.samples.columns["neighbours"]).square().mean()))
-    assert found[1] < 0.6 * found[0], found
-
-
-@pytest.mark.parametrize("symmetry", ["construction", "none"])
 def test_what_the_value_alone_is_told_moves_no_action(symmetry: Any) -> None:
     settings = SETTINGS.model_copy(update={"symmetry": symmetry})
     some = finish(TeacherTraining(settings, PointMasses(), MIRRORS, seed=3, value_only=[2]))

@@ -1,6 +1,10 @@
 """What of a section decides results."""
 
-from pydantic import Field
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import pytest
+from pydantic import Field, ValidationError
 
 from iowbc.recipe.section import COSMETIC, LATER, Section, deciding
 
@@ -10,6 +14,12 @@ class Inner(Section):
 
     old: int = 1
     added: float = Field(default=0.5, json_schema_extra=LATER)
+
+
+class Shorter(Inner):
+    """The same, once longer."""
+
+    withdrawn: ClassVar[Mapping[str, Any]] = {"gone": 8}
 
 
 class Outer(Section):
@@ -25,3 +35,11 @@ def test_a_field_that_came_later_decides_nothing_until_it_departs_from_its_defau
     assert deciding(Outer(parts=(Inner(added=0.7),))) == {"parts": [{"old": 1, "added": 0.7}]}
     assert deciding(Outer(more=Inner(old=3)))["more"] == {"old": 3}
     assert deciding(Outer(more=Inner(old=2, added=0.5), title="y")) == {"parts": [{"old": 1}]}
+
+
+def test_a_withdrawn_field_may_keep_the_value_whose_behaviour_remains() -> None:
+    assert deciding(Shorter.model_validate({"old": 2, "gone": 8})) == {"old": 2}
+    with pytest.raises(ValidationError, match="gone was withdrawn; its behaviour is that of 8: remove it"):
+        Shorter.model_validate({"gone": 9})
+    with pytest.raises(ValidationError, match="Extra inputs"):
+        Inner.model_validate({"gone": 8})

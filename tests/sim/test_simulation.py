@@ -2,14 +2,11 @@
 
 import numpy as np
 import pytest
-from changes import changed
 from stepping import run
 
 from iowbc import counter_random as random
 from iowbc.recipe.simulation.simulation import SimulationSettings as Recipe
-from iowbc.sim.divergence import Divergence, replay
 from iowbc.sim.simulation import Simulation
-from iowbc.sim.timing import Timing
 
 SCENES = ["lift", "free", "push", "lift", "tyre", "lift"]
 
@@ -117,7 +114,6 @@ def test_planted_nan_marks_that_environment_alone_and_is_counted(start):
     simulation.step()
     healthy.step()
     assert np.array_equal(simulation.state.diverged, [False, False, True, False])
-    assert len(simulation.divergences) == 1
     assert np.array_equal(simulation.state.joint_position[2], before)
     for arrays in (vars(simulation.state), vars(simulation.measured)):
         assert all(np.isfinite(values).all() for values in arrays.values())
@@ -134,19 +130,6 @@ def test_diverged_environment_lives_on_after_a_reset(start, carrying):
     run(simulation, 10)
     assert not simulation.state.diverged.any()
     assert simulation.state.base_position[1, 2] > 0.6
-
-
-def test_divergence_is_kept_and_diverges_again_when_replayed(start, robot, tmp_path):
-    recipe = changed(Recipe(), "physics.fastest", 8.0)  # so that a plain step of the joints counts
-    simulation = start(recipe, ["push", "lift"], action_latency=0.0)
-    wander(simulation, 4)
-    simulation.target[1] += 2.5
-    simulation.step()
-    assert simulation.state.diverged[1]
-    kept = simulation.divergences[-1]
-    assert (kept.scene, kept.environment, kept.episode, kept.step) == ("lift", 1, 1, 5)
-    kept.save(tmp_path / "kept.npz")
-    assert replay(robot, recipe, Divergence.load(tmp_path / "kept.npz"), Timing(0.02, 0.005, 4))
 
 
 def test_mujoco_writes_no_log_file(start, tmp_path, monkeypatch):

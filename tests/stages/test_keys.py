@@ -47,7 +47,6 @@ COSMETIC = {
     "stages",
     "robot",
     "execution",
-    "simulation.physics.divergences_kept",
     "teacher.check.films",
     "teacher.start",
     "teacher.history.student",

@@ -1,13 +1,11 @@
 """A simulation that leaves the numbers."""
 
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 from task_worlds import actions
 
 from iowbc.recipe.task.reward import Reward
-from iowbc.sim.divergence import Divergence
 from iowbc.task.curriculum import AXES
 from iowbc.task.vector.vector_env import VectorEnv
 
@@ -19,8 +17,8 @@ def plant_nan(env: VectorEnv, index: int) -> None:
     world.qvel[place, 7] = np.nan
 
 
-def test_a_nan_resets_that_environment_alone_and_is_counted(make: Make, tmp_path: Path) -> None:
-    env, calm = make(divergences=tmp_path / "kept"), make()
+def test_a_nan_resets_that_environment_alone_and_is_counted(make: Make) -> None:
+    env, calm = make(), make()
     env.reset(), calm.reset()
     for step in range(10):
         env.step(actions(step, 4, 0.2)), calm.step(actions(step, 4, 0.2))
@@ -41,17 +39,6 @@ def test_a_nan_resets_that_environment_alone_and_is_counted(make: Make, tmp_path
     assert figures["divergences"] == 1.0
     assert figures["terminations/diverged"] == 1.0
     assert env.statistics()["divergences"] == 0.0
-
-
-def test_a_divergence_is_kept_for_replay(make: Make, tmp_path: Path) -> None:
-    env = make(divergences=tmp_path / "kept")
-    env.reset()
-    env.step(actions(0, 4))
-    plant_nan(env, 3)
-    env.step(actions(1, 4))
-    (file,) = (tmp_path / "kept").iterdir()
-    kept = Divergence.load(file)
-    assert (kept.scene, kept.environment, kept.step) == ("lift", 3, 2)
 
 
 def test_a_divergence_does_not_move_the_curriculum(make: Make) -> None:

@@ -1,10 +1,11 @@
 """Simulation settings: physics, scenes, partner, randomization, sensing."""
 
-from typing import Literal
+from collections.abc import Mapping
+from typing import Any, ClassVar, Literal
 
 from pydantic import Field
 
-from iowbc.recipe.section import COSMETIC, Section
+from iowbc.recipe.section import Section
 from iowbc.recipe.simulation.partner import PartnerSettings
 from iowbc.recipe.simulation.randomization import Impulses, Pushes, Randomization
 from iowbc.recipe.simulation.scene import Scenes
@@ -38,6 +39,8 @@ class SensorNoise(Section):
 class Physics(Section):
     """Integration by MuJoCo."""
 
+    withdrawn: ClassVar[Mapping[str, Any]] = {"divergences_kept": 8}
+
     timestep: float = Field(default=0.005, gt=0.0, le=0.02)
     """Physics step [s]; the control period must be a multiple of it."""
     pd: Literal["implicit", "explicit"] = "implicit"
@@ -64,8 +67,6 @@ class Physics(Section):
     """Smallest contact force of a foot on the ground, or of a palm on an object, that counts as contact [N]."""
     fastest: float = Field(default=200.0, gt=0.0)
     """Speed above which a simulation counts as diverged [m/s, rad/s]; the fastest joint reaches 37 rad/s."""
-    divergences_kept: int = Field(default=8, ge=0, le=1000, json_schema_extra=COSMETIC)
-    """Number of diverged simulations that are kept for replay."""
 
 
 class SimulationSettings(Section):

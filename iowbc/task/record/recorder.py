@@ -1,14 +1,10 @@
 """Records signals and counters of each step."""
 
-from collections import deque
-from pathlib import Path
-
 import numpy as np
 from numpy.typing import NDArray
 
 from iowbc.arrays import Array, Mask
 from iowbc.control.command import HEIGHT, PITCH, VELOCITY, YAW_RATE
-from iowbc.sim.divergence import Divergence
 from iowbc.sim.simulation import Simulation
 from iowbc.sim.state import SimulationState
 from iowbc.task.endings import Ending
@@ -24,16 +20,6 @@ TORSO_CENTRE = 0.25
 COLUMN = {name: index for index, name in enumerate(COUNTERS)}
 STANDING, WALKING = (slice(COLUMN[f"{kind}/steps"], COLUMN[f"{kind}/{ERRORS[-1]}"] + 1) for kind in KINDS)
 """Columns of steps and errors."""
-
-
-def keep_divergences(divergences: deque[Divergence], folder: Path | None) -> None:
-    """Saves records of diverged simulations to a folder; without one, discards them."""
-    while divergences:
-        divergence = divergences.popleft()
-        if folder is not None:
-            folder.mkdir(parents=True, exist_ok=True)
-            name = f"divergence-{divergence.environment}-{divergence.episode}-{divergence.step}.npz"
-            divergence.save(folder / name)
 
 
 def write_signals(

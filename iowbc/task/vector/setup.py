@@ -3,7 +3,6 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 
@@ -26,8 +25,6 @@ class Setup:
     seed: int
     episodes: tuple[Episode, ...] | None = None
     """Episode of each environment; None draws episodes as in training."""
-    divergences: Path | None = None
-    """Folder in which diverged simulations are kept for replay."""
 
     def __post_init__(self) -> None:
         if self.count < 1:
@@ -59,7 +56,6 @@ class Setup:
             seed=self.seed,
             buffers=buffers,
             episodes=None if self.episodes is None else self.episodes[first:last],
-            divergences=self.divergences,
         )
 
 

@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -46,18 +45,17 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
         workers: int | Callable[[Setup], Workers],
         seed: int,
         episodes: Sequence[Episode] | None = None,
-        divergences: Path | None = None,
         patience: float = PATIENCE,
     ) -> None:
         """`workers`: number of processes, 0 to step in this one, or a factory of `Workers`. `episodes`: one per
-        environment, restarted by every reset. `divergences`: folder for simulations that diverged.
+        environment, restarted by every reset.
 
         The rollout does not depend on `workers`. Raises WorkerFailed when a worker dies, hangs for `patience` [s] or
         raises, and StageFailed where a function in a user's file cannot be used: a part of s_priv, or a term of the
         reward where episodes are drawn.
         """
         trials = None if episodes is None else tuple(episodes)
-        self.setup = Setup(specification, num_envs, seed, trials, divergences)
+        self.setup = Setup(specification, num_envs, seed, trials)
         recipe = specification.recipe
         self.layout = full_layout(recipe, load_robot(specification.robot))
         load_parts(recipe.task.observation)  # errors in them are raised here, before processes start
