@@ -82,7 +82,7 @@ def play(
         policy = open_policy(source, environment)
         if request.video is None:
             return episode, play_in_viewer(environment, policy, interrupted), 0
-        settings = request.video_settings or recipe.eval.video.model_copy(update={"duration": episode.duration})
+        settings = recipe.eval.video.model_copy(update={"duration": episode.duration})
         title = f"{recipe.name}: {episode.scene}, {request.object_mass:g} kg, seed {request.seed}"
         with written_film(request.video, settings.fps) as add:
             outcome, frames = film_episode(
