@@ -9,6 +9,8 @@ from iowbc.arrays import Array, Mask
 from iowbc.errors import StageFailed
 from iowbc.robot.description import Robot
 
+PLACE = "eval.public"
+"""Place of a public controller in the recipe, for messages."""
 VELOCITIES = ("v_x", "v_y", "yaw_rate")
 
 
@@ -96,7 +98,7 @@ class Adapter:
         return np.concatenate(past, axis=2).reshape(rows, -1)
 
 
-def validate_adapter(adapter: Adapter, robot: Robot, frequency: float, where: str, *, moves_arms: bool = False) -> None:
+def validate_adapter(adapter: Adapter, robot: Robot, frequency: float, *, moves_arms: bool = False) -> None:
     """Check an adapter against a robot and a control rate [Hz], and its network against its observation.
     `moves_arms`: the controller acts on all arm joints, too.
 
@@ -124,8 +126,8 @@ def validate_adapter(adapter: Adapter, robot: Robot, frequency: float, where: st
     if unknown:
         problems.append(f"ranges: {', '.join(unknown)}: no such velocity; valid: {', '.join(VELOCITIES)}")
     if problems:
-        raise StageFailed(f"{where}: does not fit the robot {robot.name}: {'; '.join(problems)}")
-    _check_network_output(adapter, where)
+        raise StageFailed(f"{PLACE}: does not fit the robot {robot.name}: {'; '.join(problems)}")
+    _check_network_output(adapter)
 
 
 def _joint_name_problems(adapter: Adapter, robot: Robot, moves_arms: bool) -> list[str]:
@@ -140,7 +142,7 @@ def _joint_name_problems(adapter: Adapter, robot: Robot, moves_arms: bool) -> li
     return [*found, f"acted: lacks {missing}{remedy}"] if missing else found
 
 
-def _check_network_output(adapter: Adapter, where: str) -> None:
+def _check_network_output(adapter: Adapter) -> None:
     """Check the network's output for a robot that stands in the default posture."""
     try:
         parts = [np.asarray(term(standing(adapter)), np.float64)[:, None] for term in adapter.terms]
@@ -148,10 +150,10 @@ def _check_network_output(adapter: Adapter, where: str) -> None:
         observation = adapter.observed(past).astype(np.float32)
         answer = np.asarray(adapter.network(observation))
     except Exception as error:
-        raise StageFailed(f"{where}: cannot make a step: {type(error).__name__}: {error}") from error
+        raise StageFailed(f"{PLACE}: cannot make a step: {type(error).__name__}: {error}") from error
     if answer.shape != (1, len(adapter.acted)) or not np.isfinite(answer).all():
         text = f"its network gives shape {answer.shape} for an observation of {observation.shape[1]} numbers"
-        raise StageFailed(f"{where}: {text}; expected {(1, len(adapter.acted))} finite numbers, one a joint of `acted`")
+        raise StageFailed(f"{PLACE}: {text}; expected {(1, len(adapter.acted))} finite numbers, one a joint of `acted`")
 
 
 def standing(adapter: Adapter) -> Seen:

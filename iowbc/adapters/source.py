@@ -12,7 +12,7 @@ import numpy as np
 import yaml
 
 from iowbc.adapters import deploy, holosoma
-from iowbc.adapters.adapter import Adapter, validate_adapter
+from iowbc.adapters.adapter import PLACE, Adapter, validate_adapter
 from iowbc.errors import StageFailed
 from iowbc.files import file_digest
 from iowbc.recipe.beside import CustomFunction
@@ -22,7 +22,6 @@ from iowbc.robot.description import DESCRIPTION, Robot, kind_of, side_sign
 from iowbc.task.own_function import load_function
 
 SHIPPED = {"holosoma": holosoma.adapter, "deploy": deploy.adapter}
-PLACE = "eval.public"
 CONTRACT = "it takes the controller's pathlib.Path and returns an iowbc.adapters.adapter.Adapter"
 
 
@@ -54,11 +53,11 @@ def adapted_robot(controller: PublicController, robot: Robot, task: Task) -> Pat
     """Folder with a robot description that has the controller's gains and default posture. Raises StageFailed if the
     controller cannot be used or does not fit the robot."""
     adapter = load_adapter(controller)
-    validate_adapter(adapter, robot, task.control_frequency, PLACE, moves_arms=controller.moves_arms)
-    return robot_of(adapter, robot, PLACE, moves_arms=controller.moves_arms)
+    validate_adapter(adapter, robot, task.control_frequency, moves_arms=controller.moves_arms)
+    return robot_of(adapter, robot, moves_arms=controller.moves_arms)
 
 
-def robot_of(adapter: Adapter, robot: Robot, where: str, *, moves_arms: bool = False) -> Path:
+def robot_of(adapter: Adapter, robot: Robot, *, moves_arms: bool = False) -> Path:
     """Folder with the robot's description in which legs and waist have the controller's gains and default posture.
 
     Arms take the controller's gains only if it moves them. The folder is deleted when the process exits. Raises
@@ -74,7 +73,7 @@ def robot_of(adapter: Adapter, robot: Robot, where: str, *, moves_arms: bool = F
             own["default"] = side_sign(row, name) * adapter.default[place]
         known = row.setdefault("own", own)
         if any(not np.isclose(known[key], own[key]) for key in own):
-            raise StageFailed(f"{where}: {name} differs from the other side in kp, kd or default; both should be alike")
+            raise StageFailed(f"{PLACE}: {name} differs from the other side in kp, kd or default; both should be alike")
     for row in rows.values():
         row |= {key: float(value) for key, value in row.pop("own", {}).items()}
     return _folder(robot.folder, yaml.safe_dump(entries))

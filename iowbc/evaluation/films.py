@@ -15,9 +15,8 @@ from PIL import Image, ImageDraw, ImageFont
 
 from iowbc.errors import NoRenderer
 from iowbc.evaluation.report.aggregate import case_names
-from iowbc.evaluation.trials.fixed_batch import in_batch
 from iowbc.evaluation.trials.plan import Trial
-from iowbc.evaluation.trials.rollout import play_in
+from iowbc.evaluation.trials.rollout import in_batch, play_in
 from iowbc.evaluation.trials.table import replayed
 from iowbc.evaluation.trials.trace import Outcome
 from iowbc.learning.acting import Policy

@@ -85,7 +85,7 @@ def play(
         if request.video is None:
             with in_window(environment.batch.simulation) as look:
                 return episode, play_in(environment, policy, interrupted, look=look)[0], 0
-        settings = request.video_settings or recipe.eval.video.model_copy(update={"duration": episode.duration})
+        settings = recipe.eval.video.model_copy(update={"duration": episode.duration})
         title = f"{recipe.name}: {episode.scene}, {request.object_mass:g} kg, seed {request.seed}"
         with written_film(request.video, settings.fps) as add:
             outcome, frames = film_episode(

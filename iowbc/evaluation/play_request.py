@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from iowbc.errors import UsageError
-from iowbc.recipe.evaluation.evaluation import Video
 from iowbc.recipe.evaluation.sequences import Segment
 from iowbc.recipe.simulation.holding import FREE
 
@@ -27,9 +26,7 @@ class PlayRequest:
     disturbances: bool = False
     """Enable random impulses on the object and pushes on the base."""
     video: Path | None = None
-    """The mp4 file to write instead of opening the viewer."""
-    video_settings: Video | None = None
-    """Video settings; None: `eval.video` without its duration limit."""
+    """The mp4 file to write instead of opening the viewer, by `eval.video` without its duration limit."""
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.mass <= HEAVIEST:

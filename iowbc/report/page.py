@@ -13,7 +13,7 @@ from iowbc.learning.curves import FIGURE
 from iowbc.pipeline.console.wording import KEY_LENGTH, duration
 from iowbc.pipeline.store.artifact import INGREDIENTS, RECIPE, Artifact
 from iowbc.report.curves import evaluation_panels, learning_panels
-from iowbc.report.runs import Group, Run, metric_rows
+from iowbc.report.runs import Group, Run, metrics_table
 from iowbc.results.table import Table
 from iowbc.stages.registry import STAGES
 
@@ -48,7 +48,7 @@ def write_page(
         version=version("iowbc"),
         runs=runs,
         groups=groups,
-        rows=[row for row in metric_rows(groups) if row.differs],
+        metrics=metrics_table(groups).rows,
         tables=tables,
         more_tables=more_tables,
         learning=[entry for entry in learning if entry[1] or entry[2]],

@@ -56,19 +56,6 @@ class Group:
         return np.array([value for value in found if value is not None], np.float64)
 
 
-@dataclass(frozen=True)
-class MetricRow:
-    """A metric of all groups."""
-
-    stage: str
-    name: str
-    cells: tuple[Cell, ...]
-    """A mean with half the spread over the seeds, a cell for each group; empty where it has none."""
-    deltas: tuple[str, ...]
-    """Difference of each further group from the first."""
-    differs: bool
-
-
 def grouped(runs: Sequence[Run]) -> list[Group]:
     """Runs by recipe, seeds together, in order of appearance; a group of several is called by its first run."""
     found: list[list[Run]] = []
@@ -83,31 +70,29 @@ def grouped(runs: Sequence[Run]) -> list[Group]:
     ]
 
 
-def metric_rows(groups: Sequence[Group]) -> list[MetricRow]:
-    """Every metric of every stage, grouped by stage."""
-    found: dict[str, dict[str, None]] = {}
+def metrics_table(groups: Sequence[Group]) -> Table:
+    """The metrics in which groups differ, or all of a single group, by stage: a column for each group, the mean with
+    half the spread over its seeds, and Δ to the first."""
+    names: dict[str, dict[str, None]] = {}
     for run in (run for group in groups for run in group.runs):
         for stage, artifact in run.artifacts.items():
-            found.setdefault(stage, {}).update(dict.fromkeys(artifact.metrics))
-    return [_row(groups, stage, metric) for stage, names in found.items() for metric in names]
-
-
-def metrics_table(groups: Sequence[Group]) -> Table:
-    """The metrics that differ: a column for each recipe, seeds together, and Δ to the first."""
+            names.setdefault(stage, {}).update(dict.fromkeys(artifact.metrics))
+    rows: list[tuple[Cell, ...]] = []
+    for stage, metric in ((stage, metric) for stage, metrics in names.items() for metric in metrics):
+        values = [group.values(stage, metric) for group in groups]
+        if len(groups) == 1 or any(not np.array_equal(np.unique(own), np.unique(values[0])) for own in values[1:]):
+            rows.append((stage, metric, *_cells(values)))
     others = [head for group in groups[1:] for head in (Column(group.label, role="detail"), f"Δ {group.label}")]
-    rows = []
-    for row in metric_rows(groups):
-        further = [cell for pair in zip(row.cells[1:], row.deltas, strict=True) for cell in pair]
-        rows += [(row.stage, row.name, row.cells[0], *further)] if row.differs else []
     return Table("metrics", "", heads("stage", "metric", groups[0].label, *others), rows, grouped=False)
 
 
-def _row(groups: Sequence[Group], stage: str, metric: str) -> MetricRow:
-    values = [group.values(stage, metric) for group in groups]
-    first = float(values[0].mean()) if len(values[0]) else None
-    deltas = tuple("" if first is None or not len(own) else figure(own.mean() - first, 3, "+") for own in values[1:])
-    differs = any(not np.array_equal(np.unique(own), np.unique(values[0])) for own in values[1:])
-    return MetricRow(stage, metric, tuple(map(_cell, values)), deltas, differs or len(groups) == 1)
+def _cells(values: Sequence[NDArray[np.float64]]) -> list[Cell]:
+    """A metric of the first group, then of each other one with its difference to the first; empty where unknown."""
+    cells = [_cell(values[0])]
+    for own in values[1:]:
+        known = len(own) and len(values[0])
+        cells += [_cell(own), figure(own.mean() - values[0].mean(), 3, "+") if known else ""]
+    return cells
 
 
 def _cell(values: NDArray[np.float64]) -> Cell:

@@ -30,7 +30,7 @@ def adapter(robot: Robot) -> Adapter:
 
 
 def test_a_fitting_adapter_passes(robot: Robot, adapter: Adapter) -> None:
-    validate_adapter(adapter, robot, 50.0, "eval.public")
+    validate_adapter(adapter, robot, 50.0)
 
 
 @pytest.mark.parametrize(
@@ -49,15 +49,15 @@ def test_a_fitting_adapter_passes(robot: Robot, adapter: Adapter) -> None:
 )
 def test_what_does_not_fit_is_named(robot: Robot, adapter: Adapter, changes: dict[str, object], message: str) -> None:
     with pytest.raises(StageFailed, match=message):
-        validate_adapter(replace(adapter, **changes), robot, 50.0, "eval.public")
+        validate_adapter(replace(adapter, **changes), robot, 50.0)
 
 
 def test_arms_of_its_own_need_all_arm_joints(robot: Robot, adapter: Adapter) -> None:
     text = "acted: lacks left_shoulder_pitch_joint, .*; a controller without arms of its own needs arms: measured or"
     with pytest.raises(StageFailed, match=text):
-        validate_adapter(adapter, robot, 50.0, "eval.public", moves_arms=True)
+        validate_adapter(adapter, robot, 50.0, moves_arms=True)
     whole = replace(adapter, acted=robot.joints, scale=np.full(29, 0.25), network=lambda seen: seen[:, :29])
-    validate_adapter(whole, robot, 50.0, "eval.public", moves_arms=True)
+    validate_adapter(whole, robot, 50.0, moves_arms=True)
 
 
 @pytest.mark.parametrize("moves_arms", [False, True])
@@ -66,7 +66,7 @@ def test_the_joints_that_it_moves_take_its_gains_and_legs_and_waist_its_posture(
 ) -> None:
     posture = np.where(["knee" in name for name in robot.joints], 0.5, robot.default_position)
     unused = posture + 0.1 * np.isin(np.arange(len(posture)), robot.interaction)
-    made = load_robot(robot_of(replace(adapter, default=unused), robot, "eval.public", moves_arms=moves_arms))
+    made = load_robot(robot_of(replace(adapter, default=unused), robot, moves_arms=moves_arms))
     for index in robot.support:
         assert (made.kp[index], made.kd[index]) == (40.0, 2.5)
     np.testing.assert_array_equal(made.kp[robot.interaction], 40.0 if moves_arms else robot.kp[robot.interaction])
@@ -78,4 +78,4 @@ def test_sides_that_differ_are_refused(robot: Robot, adapter: Adapter) -> None:
     kp = adapter.kp.copy()
     kp[robot.joints.index("right_knee_joint")] = 41.0
     with pytest.raises(StageFailed, match="right_knee_joint differs from the other side"):
-        robot_of(replace(adapter, kp=kp), robot, "eval.public")
+        robot_of(replace(adapter, kp=kp), robot)

@@ -5,6 +5,7 @@ import runpy
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -211,13 +212,11 @@ def test_an_interruption_ends_the_stage(robot: Robot, rg: Path, student: Path, t
 
 def test_an_exported_folder_plays_on_its_own(done: Job, tmp_path: Path) -> None:
     film = tmp_path / "out.mp4"
-    request = PlayRequest(
-        mass=2.0,
-        sequence=(Segment(duration=0.3, ramp=0.0),),
-        video=film,
-        video_settings=Video(width=96, height=64, fps=10),
-    )
-    episode, outcome, pictures = play(exported_source(done.out), request)
+    request = PlayRequest(mass=2.0, sequence=(Segment(duration=0.3, ramp=0.0),), video=film)
+    source = exported_source(done.out)
+    small = {"eval": source.world.recipe.eval.model_copy(update={"video": Video(width=96, height=64, fps=10)})}
+    world = replace(source.world, recipe=source.world.recipe.model_copy(update=small))
+    episode, outcome, pictures = play(replace(source, world=world), request)
     assert outcome.ending in ("finished", "fell", "dropped")
     assert episode.duration == pytest.approx(0.3)
     assert 1 <= pictures <= 4
@@ -229,9 +228,8 @@ def test_playing_an_exported_folder_tells_nobody(done: Job, tmp_path: Path) -> N
     program = (
         "from pathlib import Path; from iowbc.evaluation.play import exported_source, play;"
         "from iowbc.evaluation.play_request import PlayRequest; from iowbc.recipe.evaluation.sequences import Segment;"
-        "from iowbc.recipe.evaluation.evaluation import Video;"
         f"play(exported_source(Path({str(done.out)!r})), PlayRequest(sequence=(Segment(duration=0.1, ramp=0.0),),"
-        f"video=Path({str(tmp_path / 'out.mp4')!r}), video_settings=Video(width=96, height=64, fps=10)))"
+        f"video=Path({str(tmp_path / 'out.mp4')!r})))"
     )
     with watched(tmp_path / "watch") as watch:
         words = [sys.executable, "-c", program]

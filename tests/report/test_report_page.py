@@ -20,7 +20,7 @@ from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
 from iowbc.report.curves import MOST_POINTS, evaluation_panels, learning_figure, learning_panels
 from iowbc.report.page import write_page
-from iowbc.report.runs import Run, grouped, metric_rows
+from iowbc.report.runs import Run, grouped, metrics_table
 from iowbc.results.table import Table, heads
 
 BROWSER = shutil.which("chromium") or shutil.which("google-chrome")
@@ -83,18 +83,21 @@ def runs(tmp_path: Path) -> list[Run]:
 def test_seeds_belong_together_and_rows_that_are_alike_are_left_out(runs: list[Run]) -> None:
     groups = grouped(runs)
     assert [(group.label, len(group.runs)) for group in groups] == [("first (2 seeds)", 2), ("other", 1)]
-    rows = {(row.stage, row.name): row for row in metric_rows(groups)}
-    assert [str(cell) for cell in rows["teacher", "score"].cells] == ["2 ± 1", "5"]
-    assert rows["teacher", "score"].deltas == ("+3",)
-    assert rows["teacher", "score"].differs
-    assert not rows["teacher", "same"].differs
+    rows = {(stage, metric): [str(cell) for cell in cells] for stage, metric, *cells in metrics_table(groups).rows}
+    assert rows["teacher", "score"] == ["2 ± 1", "5", "+3"]
+    assert ("teacher", "same") not in rows
 
 
 def test_metrics_of_a_stage_stand_together_also_those_that_only_a_later_run_has(runs: list[Run]) -> None:
     more = runs[2].artifacts["teacher"].folder / "summary.json"
     more.write_text(json.dumps({"metrics": {"score": 5.0, "same": 1.0, "late": 2.0}}))
-    rows = [(row.stage, row.name) for row in metric_rows(grouped(runs))]
-    assert rows == [("teacher", "score"), ("teacher", "same"), ("teacher", "late"), ("eval", "score"), ("eval", "same")]
+    assert [row[:2] for row in metrics_table(grouped(runs)).rows] == [
+        ("teacher", "score"),
+        ("teacher", "late"),
+        ("eval", "score"),
+    ]
+    alone = [row[:2] for row in metrics_table(grouped(runs[:1])).rows]
+    assert alone == [("teacher", "score"), ("teacher", "same"), ("eval", "score"), ("eval", "same")]
 
 
 def test_learning_curves_of_seeds_are_a_band_and_of_few_points(runs: list[Run]) -> None:
