@@ -179,6 +179,7 @@ class Runner:
         earlier = workspace.begin(self.loaded.recipe.name, forced, dict(step.code), self.command())
         workspace.describe(ingredients, resolved)
         view.metric, view.curve = workspace.state.metric, [*workspace.state.curve]
+        view.done, view.total = workspace.state.done, workspace.state.total
         view.began = time.monotonic() - workspace.seconds
         self._show(stage, "runs", short(step.notes or step.reasons, 1))
         view.note = ""

@@ -1,6 +1,7 @@
 """Signals leave a checkpoint and the command that resumes; a killed run loses nothing finished; two runs share."""
 
 import json
+import re
 import shlex
 import signal
 
@@ -43,12 +44,15 @@ def test_a_resumed_run_shows_the_curve_from_its_first_step_on(workplace: Workpla
     assert command.finish() == 130
     reached = workplace.checkpoint("teacher")
 
-    again = workplace.start("run", "small.yaml", behaviour=SLOW)
+    often = ("--set", "execution.line_interval=0.001")
+    again = workplace.start("run", "small.yaml", *often, behaviour=SLOW)
     until(lambda: workplace.checkpoint("teacher") > reached + 2)
     again.signal(signal.SIGINT)
     assert again.finish() == 130
     steps = [step for step, _ in workplace.progress("teacher")["curve"]]  # type: ignore[index]
     assert steps[0] < reached < steps[-1]
+    told = [int(share) for share in re.findall(r"^teacher: (\d+) %", again.output + again.errors, re.MULTILINE)]
+    assert told and min(told) > 0, "not from 0 % on"
 
 
 def test_a_second_signal_aborts_at_once(workplace: Workplace) -> None:

@@ -40,7 +40,7 @@ def holder(runs: Runs, key: str) -> Holder | None:
     path = lock_path(runs, key)
     if not path.exists():
         return None
-    with path.open("a") as file:
+    with path.open("rb") as file:
         try:
             fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
         except BlockingIOError:
