@@ -15,7 +15,7 @@ from rich.text import Text
 from iowbc.commands import completion, options
 from iowbc.commands.lookup import known_recipes, last_used, named
 from iowbc.commands.printed import artifact_data, plain_table, print_json, shown_path, stdout_console, tell
-from iowbc.errors import require_known, shown
+from iowbc.errors import UsageError, require_known, shown
 from iowbc.pipeline.console.live_table import sparkline
 from iowbc.pipeline.console.wording import KEY_LENGTH, ago, duration, figure
 from iowbc.pipeline.nested import flattened
@@ -36,7 +36,7 @@ def status(as_json: options.AsJson = False, runs: options.RunsFolder = options.R
     if as_json:
         print_json(console, _data(store))
         return
-    going_on, recipes = unfinished(store.runs), known_recipes(store)
+    going_on, recipes = unfinished(store.runs), _readable_recipes(store)
     for folder, record in going_on:
         _print_work(store, console, folder, record)
     stopped = [record.command for folder, record in going_on if not holder(store.runs, folder.name)]
@@ -58,6 +58,19 @@ def status(as_json: options.AsJson = False, runs: options.RunsFolder = options.R
         log = shown_path(store.runs.tracking / "sender.log")
         text = f"MLflow lacks something of {len(waiting)} runs; the next run sends it (its log: {log})"
         console.print(text, highlight=False)
+
+
+def _readable_recipes(store: Store) -> list[str]:
+    """Names of the recipes that have finished a stage; one with a damaged record is reported and left out."""
+    found = []
+    for name in known_recipes(store):
+        try:
+            recall(store.runs, name)
+        except UsageError as error:
+            tell(Console(stderr=True), str(error))
+        else:
+            found.append(name)
+    return found
 
 
 def _print_work(store: Store, console: Console, folder: Path, record: Progress) -> None:
@@ -83,7 +96,7 @@ def _data(store: Store) -> dict[str, Any]:
         }
         for folder, record in unfinished(store.runs)
     ]
-    recipes = {name: recall(store.runs, name).stages for name in known_recipes(store)}
+    recipes = {name: recall(store.runs, name).stages for name in _readable_recipes(store)}
     return {"unfinished": working, "recipes": recipes, "unsent": len(backlog(store.runs))}
 
 
@@ -99,7 +112,7 @@ def ls(
     if stage is not None:
         require_known(stage, "stage", PIPELINE)
     users: dict[str, list[str]] = {}
-    for recipe in known_recipes(store):
+    for recipe in _readable_recipes(store):
         for key in ever_used(store.runs, recipe):
             users.setdefault(key, []).append(recipe)
     if as_json:

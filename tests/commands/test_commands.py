@@ -252,6 +252,10 @@ def test_a_damaged_record_of_a_recipe_is_named_and_keeps_gc_from_removing(folder
     for done in (command(*words) for words in arguments):
         assert done.returncode == 2
         assert done.stderr == "runs/recipes/first.json is damaged; run the recipe again to remake it\n"
+    for words in (["status"], ["ls"], ["status", "--json"]):
+        done = command(*words)
+        assert (done.returncode, done.stderr.count("first.json is damaged")) == (0, 1)
+        assert "second" in done.stdout
     assert command("run", "first.yaml").stdout.count(": cached") == 6
     assert command("gc", "--unused").stdout == "0 bytes in all\n"
 
