@@ -101,25 +101,15 @@ class StudentTraining:
         self.starts = np.ones(settings.environments, np.bool_)
         self.observation: NDArray[np.float32] | None = None
         self.teacher_drives = spread(settings.environments)
-        self.rounds = 0
+        self._steps_a_round = settings.environments * settings.rollout
+        self.rounds, self._planned_rounds = 0, -(-settings.steps // self._steps_a_round)
+        self.planned = self._planned_rounds * self._steps_a_round
+        """Environment steps of the whole training, rounded up to whole rounds."""
 
     @property
     def steps(self) -> int:
         """Environment steps made so far."""
         return self.rounds * self._steps_a_round
-
-    @property
-    def planned(self) -> int:
-        """Environment steps of the whole training, rounded up to whole rounds."""
-        return self._planned_rounds * self._steps_a_round
-
-    @property
-    def _steps_a_round(self) -> int:
-        return self.settings.environments * self.settings.rollout
-
-    @property
-    def _planned_rounds(self) -> int:
-        return -(-self.settings.steps // self._steps_a_round)
 
     def update(self) -> dict[str, float]:
         """One round: a rollout and its gradient steps; returns the statistics of both."""

@@ -48,6 +48,8 @@ class TeacherTraining:
         `value_only`: indices of observations for the value network only; `device`: torch device of the networks;
         `score`: fixed evaluation that selects the best policy; `say`: receives a message at each rollback."""
         self.settings, self.environments, self.mirrors = settings, environments, mirrors
+        self.planned = settings.steps
+        """Environment steps of the whole training; the last update may exceed them."""
         self.score = score if settings.check.every is not None else None
         self.say = say
         self.model = Learner(settings, environments, seed, mirrors, cores, value_only, device)
@@ -61,11 +63,6 @@ class TeacherTraining:
     def steps(self) -> int:
         """Environment steps made so far."""
         return self.model.steps
-
-    @property
-    def planned(self) -> int:
-        """Environment steps of the whole training; the last update may exceed them."""
-        return self.settings.steps
 
     def update(self) -> dict[str, float]:
         """One rollout with its gradient steps and, at the check interval, an evaluation; returns their statistics.

@@ -19,7 +19,6 @@ from iowbc.sim.disturbance import Disturbance
 from iowbc.sim.drives import Drives
 from iowbc.sim.episode_draws import Draws
 from iowbc.sim.sensing import Sensing
-from iowbc.sim.snapshots import by_environment, by_world
 from iowbc.sim.state import Period, SimulationState
 from iowbc.sim.timing import Timing
 from iowbc.sim.world import EVERY, World, make_world
@@ -29,6 +28,8 @@ STARTS_AT_ZERO = (
     *("external_force", "push_force"),
 )
 """Fields of the state that are zero at the start of an episode."""
+DELAY_LINES = ("sensing/robot/values", "sensing/object/values", "partner/line/values")
+"""Values of delay lines, (periods, n, width); the names in a snapshot begin with `ring/` after their first form."""
 
 
 class Simulation:
@@ -263,7 +264,7 @@ class Simulation:
         return self._pressed + np.minimum(needed, self._strength)
 
     def _memory(self) -> dict[str, Array]:
-        """State arrays, without those of the worlds."""
+        """State arrays by their names in a snapshot, one row per environment, without those of the worlds."""
         own: dict[str, Array] = {"episode": self.episode, "clock": self.clock, "episode_key": self._episode_key}
         own |= {"target": self.target, "feed": self.feed, "robot_mass": self._robot_mass, "borne": self._borne}
         own["noise"] = self._noise
@@ -277,28 +278,29 @@ class Simulation:
             "pushes": self._pushes.arrays(),
             "fixed": self.fixed,
         }
-        return own | {f"{part}/{name}": values for part, arrays in parts.items() for name, values in arrays.items()}
+        own |= {f"{part}/{name}": values for part, arrays in parts.items() for name, values in arrays.items()}
+        delayed = {f"ring/{name}": own.pop(name).swapaxes(0, 1) for name in DELAY_LINES}
+        return delayed | {f"simulation/{name}": values for name, values in own.items()}
 
     def snapshot(self) -> dict[str, Array]:
-        """Copies of the complete state, one row per environment; `restore` continues bit for bit."""
+        """Copies of the complete state, one row per environment, whatever processes they are spread over; `restore`
+        continues bit for bit."""
         saved = {name: values.copy() for name, values in self._memory().items()}
-        for index, world in enumerate(self.worlds):
-            saved |= {f"world{index}/{name}": values for name, values in world.snapshot().items()}
-        return by_environment(saved, self._scenes)
+        for scene, world in zip(self._scenes, self.worlds, strict=True):
+            saved |= {f"scene/{scene}/{name}": values for name, values in world.snapshot().items()}
+        return saved
 
-    def restore(self, rows: Mapping[str, Array]) -> None:
+    def restore(self, saved: Mapping[str, Array]) -> None:
         """Inverse of `snapshot`, into a simulation of the same robot, recipe, environments and scenes; other entries
         are ignored."""
-        saved = by_world(rows, self._scenes)
-        self.hold({name.removeprefix("fixed/"): values for name, values in saved.items() if name.startswith("fixed/")})
+        self.hold(_under("simulation/fixed/", saved))
         for name, values in self._memory().items():
             if name not in saved or saved[name].shape != values.shape:
                 found = saved[name].shape if name in saved else "nothing"
                 raise ValueError(f"snapshot of another simulation: {name} is {found}, expected {values.shape}")
             values[...] = saved[name]
-        for index, world in enumerate(self.worlds):
-            start = f"world{index}/"
-            world.restore({k.removeprefix(start): v for k, v in saved.items() if k.startswith(start)})
+        for scene, world in zip(self._scenes, self.worlds, strict=True):
+            world.restore(_under(f"scene/{scene}/", saved))
         self.partner.restored()
 
     def world_of(self, env: int) -> tuple[World, int]:
@@ -329,3 +331,8 @@ def _scene(recipe: Recipe, name: str) -> Any:
     if name not in known:
         raise KeyError(f"no scene {name!r}; there are: {', '.join(known)}")
     return getattr(recipe.scenes, name)
+
+
+def _under(beginning: str, arrays: Mapping[str, Array]) -> dict[str, Array]:
+    """The arrays whose names begin so, without that."""
+    return {name.removeprefix(beginning): values for name, values in arrays.items() if name.startswith(beginning)}

@@ -1,9 +1,5 @@
 """Signals and counters that an environment batch writes for its parent in each step."""
 
-from collections.abc import Mapping
-
-from iowbc.task.vector.shared import Fields
-
 SIGNALS = {
     "system_velocity": 3,
     "commanded_velocity": 3,
@@ -71,21 +67,3 @@ COUNTERS = (
 def trial_signals(joints: int, support: int) -> dict[str, int]:
     """Signals only of planned episodes, with sizes; `joints`, `support`: numbers of all and of support joints."""
     return TRIAL_SIGNALS | dict.fromkeys(JOINT_SIGNALS, joints) | {ACTION_SIGNAL: support}
-
-
-def buffer_fields(observation: int, action: int, terms: int, extra: Mapping[str, int]) -> Fields:
-    """Arrays exchanged between a batch and its parent; `terms`: number of reward terms; `extra`: additional signals,
-    with sizes."""
-    return {
-        "action": ((action,), "float32"),
-        "observation": ((observation,), "float32"),
-        "terminal_observation": ((observation,), "float32"),
-        "reward": ((), "float32"),
-        "done": ((), "bool"),
-        "truncated": ((), "bool"),
-        "episode_return": ((), "float64"),
-        "episode_length": ((), "int64"),
-        "counters": ((len(COUNTERS),), "float64"),
-        "terms": ((terms,), "float64"),
-        **{f"signal/{name}": ((size,), "float64") for name, size in (SIGNALS | dict(extra)).items()},
-    }

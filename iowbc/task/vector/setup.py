@@ -10,7 +10,7 @@ from iowbc.robot.description import load_robot
 from iowbc.task.batch import Batch
 from iowbc.task.episodes import Episode
 from iowbc.task.layout import full_layout
-from iowbc.task.record.signals import buffer_fields, trial_signals
+from iowbc.task.record.signals import COUNTERS, SIGNALS, trial_signals
 from iowbc.task.rewards.reward import term_names
 from iowbc.task.specification import Specification
 from iowbc.task.vector.shared import Buffers, Fields
@@ -40,12 +40,23 @@ class Setup:
 
     def buffer_fields(self) -> Fields:
         """Arrays exchanged between the environments and the learner."""
-        robot = load_robot(self.specification.robot)
-        extra = {} if self.episodes is None else trial_signals(len(robot.joints), len(robot.support))
-        recipe = self.specification.recipe
-        terms, public = len(term_names(recipe.task.reward)), recipe.eval.public
-        actions = len(robot.support) + (len(robot.interaction) if public is not None and public.moves_arms else 0)
-        return buffer_fields(full_layout(recipe, robot).size, actions, terms, extra)
+        recipe, robot = self.specification.recipe, load_robot(self.specification.robot)
+        observation, support, public = full_layout(recipe, robot).size, len(robot.support), recipe.eval.public
+        action = support + (len(robot.interaction) if public is not None and public.moves_arms else 0)
+        signals = SIGNALS if self.episodes is None else SIGNALS | trial_signals(len(robot.joints), support)
+        return {
+            "action": ((action,), "float32"),
+            "observation": ((observation,), "float32"),
+            "terminal_observation": ((observation,), "float32"),
+            "reward": ((), "float32"),
+            "done": ((), "bool"),
+            "truncated": ((), "bool"),
+            "episode_return": ((), "float64"),
+            "episode_length": ((), "int64"),
+            "counters": ((len(COUNTERS),), "float64"),
+            "terms": ((len(term_names(recipe.task.reward)),), "float64"),
+            **{f"signal/{name}": ((size,), "float64") for name, size in signals.items()},
+        }
 
     def batch(self, first: int, last: int, buffers: Buffers) -> Batch:
         """The environments from `first` to `last`, the latter excluded; `buffers` hold their rows alone."""
