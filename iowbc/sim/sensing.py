@@ -6,8 +6,8 @@ from iowbc.arrays import Array, Indices, Mask
 from iowbc.control.sensors import Measured
 from iowbc.recipe.simulation.simulation import SensorNoise as Recipe
 from iowbc.robot import rotations
+from iowbc.sim.delay import DelayLine
 from iowbc.sim.state import SimulationState
-from iowbc.sim.timing import DelayLine
 
 SIZES = {
     "base_angular_velocity": 3,
