@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
+from pydantic import TypeAdapter
+
 from iowbc.task.commands.script import CommandScript
 
 
@@ -68,14 +70,8 @@ class Episode:
 
     @classmethod
     def from_json(cls, values: Mapping[str, Any]) -> "Episode":
-        push, pull = values["push"], values.get("pull")
-        script = None if values["script"] is None else CommandScript.from_json(values["script"])
-        return cls(
-            scene=str(values["scene"]),
-            seed=int(values["seed"]),
-            duration=float(values["duration"]),
-            fixed={str(name): float(value) for name, value in values["fixed"].items()},
-            script=script,
-            push=None if push is None else PlannedPush(**{**push, "impulse": tuple(push["impulse"])}),
-            pull=None if pull is None else PlannedPull(**{**pull, "force": tuple(pull["force"])}),
-        )
+        script = None if values["script"] is None else {"segments": values["script"]}
+        return EPISODE.validate_python({**values, "script": script})
+
+
+EPISODE = TypeAdapter(Episode)

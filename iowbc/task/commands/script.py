@@ -1,6 +1,5 @@
 """Scripted command sequences: the same for all policies under comparison."""
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -63,7 +62,3 @@ class CommandScript:
 
     def as_json(self) -> list[dict[str, Any]]:
         return [{"duration": s.duration, "ramp": s.ramp, "command": list(s.command)} for s in self.segments]
-
-    @classmethod
-    def from_json(cls, segments: Sequence[Mapping[str, Any]]) -> "CommandScript":
-        return cls(tuple(CommandSegment(s["duration"], tuple(s["command"]), s["ramp"]) for s in segments))
