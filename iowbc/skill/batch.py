@@ -45,7 +45,7 @@ class GameBatch:
         episodes = [
             Episode(scene, int(key), NO_LIMIT, UNDISTURBED) for scene, key in zip(scenes, self._keys, strict=True)
         ]
-        self.lower = LowerLayer(setup.specification, setup.student, self._games, episodes, block_size(setup.count))
+        self.lower = LowerLayer(setup.specification, setup.student, episodes, block_size(setup.count))
         self.n = n = last - first
         period, own = self.lower.period, list(setup.tasks.values())
         self.substeps = round(1.0 / (self._skill.frequency * period))
@@ -80,7 +80,7 @@ class GameBatch:
         self.drawn.agent_share = agent_share
         if seeds is not None:
             self._keys = random.environment_key(seeds, np.zeros(self.n, np.int64))
-        self.lower.rewind(self._keys)
+        self.lower.reseed(self._keys)
         self._episode[:] = 0
         for name in ("reward", "terminated", "truncated"):
             self.buffers[name][:] = 0

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from iowbc.arrays import Array, Indices, Keys
+from iowbc.arrays import Array, Indices
 from iowbc.control.command import nominal_command
 from iowbc.robot.description import load_robot
 from iowbc.rollouts.blocks import in_blocks
@@ -47,25 +47,10 @@ def load_student(folder: Path, world: Specification | None = None) -> Student:
 class LowerLayer(Batch):
     """n environments controlled by a student. Commands, partners and starts of episodes are set by the caller."""
 
-    def __init__(
-        self,
-        specification: Specification,
-        student: Student,
-        environments: Indices,
-        episodes: Sequence[Episode],
-        block: int,
-    ) -> None:
-        """`environments`: global numbers, (n,); `block`: see `iowbc.rollouts.blocks`."""
-        specification = _with_strength(specification)
-        setup = Setup(specification, len(environments), 0, tuple(episodes))
-        super().__init__(
-            specification,
-            environments=environments,
-            scenes=setup.scenes,
-            seed=0,
-            buffers=private_buffers(setup.buffer_fields(), setup.count),
-            episodes=episodes,
-        )
+    def __init__(self, specification: Specification, student: Student, episodes: Sequence[Episode], block: int) -> None:
+        """`block`: see `iowbc.rollouts.blocks`."""
+        setup = Setup(_with_strength(specification), len(episodes), 0, tuple(episodes))
+        super().__init__(setup, 0, setup.count, private_buffers(setup.buffer_fields(), setup.count))
         self.wanted = np.tile(nominal_command(specification.recipe.task.commands), (self.n, 1))
         """Commands that the robots approach, (n, 11)."""
         self.guidance.commander.steer(self.wanted)
@@ -80,12 +65,6 @@ class LowerLayer(Batch):
         self._student, self._block = student.policy, block
         self._history = History(self.n, student.history, student.observation)
         self._starts = np.ones(self.n, np.bool_)
-
-    def rewind(self, seeds: Keys) -> None:
-        """Reseeds all random draws, (n,)."""
-        self._schedule.reseed(seeds)
-        self.simulation.reseed(self._schedule.key)
-        self.memory.episode[:] = 0
 
     def start(self, which: Indices) -> None:
         """Starts new episodes in some environments, (k,)."""

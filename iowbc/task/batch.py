@@ -1,6 +1,7 @@
 """The environments of one process, stepped as arrays: simulation, guidance, judgement, observation."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,6 @@ from iowbc.robot.description import load_robot
 from iowbc.sim.simulation import Simulation
 from iowbc.task.endings import Ending
 from iowbc.task.episode_state import EpisodeState
-from iowbc.task.episodes import Episode
 from iowbc.task.guidance import Guidance
 from iowbc.task.judge import Judge, Judgement
 from iowbc.task.layout import full_layout
@@ -31,38 +31,32 @@ from iowbc.task.record.recorder import (
     write_trial_signals,
 )
 from iowbc.task.schedule import Schedule
-from iowbc.task.specification import Specification
 from iowbc.task.vector.shared import Buffers
+
+if TYPE_CHECKING:
+    from iowbc.task.vector.setup import Setup
 
 
 class Batch:
     """n environments. `step` reads the actions from the buffers; `reset` and `step` write all results there."""
 
-    def __init__(
-        self,
-        specification: Specification,
-        *,
-        environments: NDArray[np.int64],
-        scenes: Sequence[str],
-        seed: int,
-        buffers: Buffers,
-        episodes: Sequence[Episode] | None = None,
-    ) -> None:
-        """`environments`: global indices, (n,); `scenes`: their scenes, by name.
-
-        `episodes`: one per environment; None draws them as in training.
-        """
+    def __init__(self, setup: "Setup", first: int, last: int, buffers: Buffers) -> None:
+        """The environments of a setup from `first` to `last`, the latter excluded; `buffers` hold their rows alone."""
+        specification, scenes = setup.specification, setup.scenes[first:last]
+        episodes = None if setup.episodes is None else setup.episodes[first:last]
         recipe, task = specification.recipe, specification.recipe.task
         self.robot, self.buffers = load_robot(specification.robot), buffers
         self.layout = full_layout(recipe, self.robot)
-        self.n = n = len(environments)
+        self.n = n = last - first
         self.period = period = 1.0 / task.control_frequency
         self._support, self._arms = as_slice(self.robot.support), as_slice(self.robot.interaction)
         self._joint_reference = np.tile(self.robot.default_position, (n, 1))
         self.scenes = np.array(scenes)
         """Name of each environment's scene, (n,)."""
         self.memory = EpisodeState.blank(n, len(self.robot.interaction), len(self.robot.support))
-        self._schedule = schedule = Schedule(task, self.memory, environments=environments, seed=seed, trials=episodes)
+        self._schedule = schedule = Schedule(
+            task, self.memory, environments=np.arange(first, last), seed=setup.seed, trials=episodes
+        )
         self.simulation = Simulation(
             self.robot,
             recipe.simulation,
@@ -92,9 +86,7 @@ class Batch:
     def reset(self, seeds: NDArray[np.uint64] | None = None) -> None:
         """Starts an episode in every environment; `seeds` (n,) reseed all random number streams."""
         if seeds is not None:
-            self._schedule.reseed(seeds)
-            self.simulation.reseed(self._schedule.key)
-            self.memory.episode[:] = 0
+            self.reseed(seeds)
         if self._schedule.repeats:
             self.memory.episode[:] = 0
             self.simulation.episode[:] = 0
@@ -103,6 +95,12 @@ class Batch:
             self.buffers[name][:] = 0
         self._observe(moved)
         write_signals(self.buffers, self.simulation.state, moved, self.memory, Ending.none(self.n), self.period)
+
+    def reseed(self, seeds: NDArray[np.uint64]) -> None:
+        """Reseeds all random number streams from seeds (n,)."""
+        self._schedule.reseed(seeds)
+        self.simulation.reseed(self._schedule.key)
+        self.memory.episode[:] = 0
 
     def step(self) -> None:
         """One control step of every environment; those that end start a new episode."""

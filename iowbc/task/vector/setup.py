@@ -59,15 +59,8 @@ class Setup:
         }
 
     def batch(self, first: int, last: int, buffers: Buffers) -> Batch:
-        """The environments from `first` to `last`, the latter excluded; `buffers` hold their rows alone."""
-        return Batch(
-            self.specification,
-            environments=np.arange(first, last),
-            scenes=self.scenes[first:last],
-            seed=self.seed,
-            buffers=buffers,
-            episodes=None if self.episodes is None else self.episodes[first:last],
-        )
+        """The environments from `first` to `last`, the latter excluded."""
+        return Batch(self, first, last, buffers)
 
 
 def shares(count: int, parts: int) -> list[tuple[int, int]]:
