@@ -53,7 +53,7 @@ def _store() -> "Store":
     from iowbc.pipeline.store.runs import Runs
     from iowbc.pipeline.store.store import Store
 
-    return Store(Runs(Path(os.environ.get("IOWBC_RUNS", "runs"))))
+    return Store(Runs(Path(os.environ.get("IOWBC_RUNS") or "runs")))
 
 
 def _beginning(incomplete: str, names: Iterable[str]) -> list[str]:

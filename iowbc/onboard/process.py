@@ -91,7 +91,8 @@ class Times:
             f"worst {1e3 * values.max():.2f} ms"
             for name, values in (("late", self.late), ("turn", self.busy))
         ]
-        return "; ".join([f"{len(self.late)} turns", *parts])
+        last = "the last " if len(self.late) == KEPT_TIMES else ""
+        return "; ".join([f"{last}{len(self.late)} turns", *parts])
 
 
 def listen(bus: "DdsBus", seconds: float, stopped: Callable[[], bool] = lambda: False) -> BusSnapshot:
