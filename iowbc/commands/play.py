@@ -46,6 +46,8 @@ if TYPE_CHECKING:
     from iowbc.task.specification import Specification
 
 SKILL = "skill"
+MASS = 4.0
+"""Mass of the object by default [kg]."""
 
 
 @dataclass(frozen=True)
@@ -70,10 +72,16 @@ def play(
         str | None, typer.Option(help="Stage whose policy is played (default: the last one available).")
     ] = None,
     scene: options.SceneName = "lift",
-    mass: Annotated[float, typer.Option(help="Object mass [kg]; 0 removes the object.", min=0.0)] = 4.0,
+    mass: Annotated[
+        float | None,
+        typer.Option(help="Object mass [kg]; 0 removes the object (default: 4; drawn in a skill's game).", min=0.0),
+    ] = None,
     partner_share: Annotated[
-        float, typer.Option(help="Share of the weight that the partner bears.", min=0.0, max=1.0)
-    ] = 0.0,
+        float | None,
+        typer.Option(
+            help="Share of the weight that the partner bears (default: 0; drawn in a skill's game).", min=0.0, max=1.0
+        ),
+    ] = None,
     seed: Annotated[int, typer.Option(min=0, max=2**32 - 1)] = 0,
     disturbances: Annotated[bool, typer.Option("--disturbances", help="Enable random disturbances.")] = False,
     video: Annotated[
@@ -86,7 +94,12 @@ def play(
     """Play an episode of what a word names, in the viewer, in the browser or as a film. Raises `UsageError`."""
     page, store, console = options.page_port(web, port), Store(Runs(runs)), stdout_console()
     request = PlayRequest(
-        scene=scene, mass=mass, partner_share=partner_share, seed=seed, disturbances=disturbances, video=video
+        scene=scene,
+        mass=MASS if mass is None else mass,
+        partner_share=partner_share or 0.0,
+        seed=seed,
+        disturbances=disturbances,
+        video=video,
     )
     if page is not None:
         play_on_web(store, console, word, stage, request, page)
@@ -96,7 +109,7 @@ def play(
     plan = planned(store, word)
     skill = skill_to_play(store, word, stage, plan)
     if skill is not None:
-        play_game(store, console, skill, request)
+        play_game(store, console, skill, request, mass, partner_share)
         return
     source = named_source(store, console, word, stage, request.scene, plan)
 
@@ -160,7 +173,7 @@ def planned(store: Store, word: str) -> Planned:
 
 def skill_to_play(store: Store, word: str, stage: str | None, plan: Planned = Planned()) -> Artifact | None:
     """The skill that a word and `--stage` name; None where they name no skill, or another stage."""
-    if stage not in (None, SKILL) or Path(word).is_dir():
+    if stage not in (None, SKILL) or os.path.isdir(word):
         return None
     if plan.recipe is not None:
         return plan.artifacts.get(SKILL)
@@ -169,9 +182,14 @@ def skill_to_play(store: Store, word: str, stage: str | None, plan: Planned = Pl
     return None
 
 
-def play_game(store: Store, console: Console, skill: Artifact, request: PlayRequest) -> None:
+def play_game(
+    store: Store, console: Console, skill: Artifact, request: PlayRequest, mass: float | None, share: float | None
+) -> None:
     """Play a game of a skill in the viewer or as a film, with a human that the skill has not met in training and that
-    alone knows the path. Raises `UsageError`."""
+    alone knows the path. `mass` [kg], `share`: drawn if empty. Raises `UsageError`."""
+    if mass == 0.0 or request.disturbances:
+        raise UsageError("a game has an object (--mass above 0) and no random --disturbances: its human disturbs")
+
     from iowbc.skill.game import NOMINAL, ROBOT
     from iowbc.skill.plan import Plan
     from iowbc.skill.playing import film_game, show_game
@@ -179,9 +197,10 @@ def play_game(store: Store, console: Console, skill: Artifact, request: PlayRequ
 
     found = _playable_skill(store, skill, request.scene)
     partners = found.world.recipe.skill.partners
-    plan = Plan(found.task, [*partners.held_out, *partners.training][0], known=False, seed=request.seed)
+    human = [*partners.held_out, *partners.training][0]
+    plan = Plan(found.task, human, known=False, mass=mass, share=share, seed=request.seed)
     with closing(SingleGame(found.world, found.student, NOMINAL | {ROBOT: found.robot}, plan)) as game:
-        title = f"{skill.manifest.recipe}: {plan.task}, partner {plan.partner}, seed {request.seed}"
+        title = f"{skill.manifest.recipe}: {plan.task}, {game.mass:.0f} kg, partner {human}, seed {request.seed}"
         tell(console, title)
         made = ""
         try:
@@ -228,7 +247,7 @@ def _driven(
 ) -> "tuple[Source, Actor | None]":
     """The policy to drive by hand, and the trials of its evaluation."""
     found: Mapping[str, Artifact] = {}
-    if not Path(word).is_dir():
+    if not os.path.isdir(word):
         with contextlib.suppress(UsageError):  # a first training has nothing finished yet
             found = named(store, word).artifacts
     evaluation = found.get("eval")

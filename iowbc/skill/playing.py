@@ -12,20 +12,18 @@ from iowbc.skill.single_game import SingleGame
 
 
 def show_game(game: SingleGame) -> None:
-    """Play a game in real time in a window. Raises NoDisplay, Interrupted when the window is closed."""
+    """Play a game from its beginning, in real time in a window. Raises NoDisplay, and Interrupted when it is closed."""
     require_display()
-    game.reset()
     with in_window(game.lower.simulation, game.lines()) as look:
         _play_to_the_end(game, look)
 
 
 def film_game(game: SingleGame, path: Path, title: str, progress: Callable[[float, float], None]) -> int:
-    """Play a game to an mp4 file, without a display; returns the number of frames.
+    """Play a game from its beginning to an mp4 file, without a display; returns the number of frames.
 
     `title`: text in every frame, above the line with time, way, force and command; `progress` receives the rendered and
     the longest duration [s]. Raises NoRenderer.
     """
-    game.reset()
     video = game.recipe.eval.video.model_copy(update={"duration": game.duration})
     with (
         written_film(path, video.fps) as add,

@@ -21,7 +21,7 @@ EVERY = 4
 
 
 class SingleGame:
-    """One game. Begin it with `reset`, and close it."""
+    """One game, at its beginning. Close it."""
 
     def __init__(
         self,
@@ -39,10 +39,11 @@ class SingleGame:
         self.lower = self.batch.lower
         self.period = self.lower.period
         """Control period [s]."""
-        self.steps = 0
+        self.steps: int
         """Control steps since the beginning."""
-        self.ending = ""
+        self.ending: str
         """Reason of the game's end; empty before it."""
+        self.reset()
 
     @property
     def seconds(self) -> float:

@@ -59,7 +59,7 @@ def test_a_film_shows_the_game_to_its_end(
     with closing(TransportGame(world, student, n=1, plans=(PLAN,))) as again:
         figures = play_once(again, networks)
     assert figures[game.ending][0]
-    game.reset()
+    game.reset()  # an ended game has begun another
     assert game.mass == pytest.approx(figures["mass"][0])
 
 

@@ -14,6 +14,7 @@ from iowbc.commands.lookup import named
 from iowbc.commands.play import playable, skill_to_play
 from iowbc.control.sensors import Measured
 from iowbc.deploy.controller import Controller
+from iowbc.errors import UsageError
 from iowbc.evaluation.report.aggregate import aggregate
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
@@ -103,6 +104,14 @@ def test_a_fresh_clone_has_a_skill_whose_partner_one_can_be(tmp_path: Path) -> N
     assert all(one is not None and (one.manifest.stage, one.manifest.recipe) == ("skill", "transport") for one in found)
     for other in (("transport", "teacher"), ("full", None), ("nothing", None)):
         assert skill_to_play(store, *other) is None
+
+
+def test_a_published_game_is_not_played_without_an_object(tmp_path: Path) -> None:
+    (tmp_path / "runs").mkdir()
+    (tmp_path / "runs" / "published").symlink_to(ROOT / "runs" / "published")
+    done = CliRunner().invoke(app, ["play", "transport", "--mass", "0", "--runs", str(tmp_path / "runs")])
+    assert isinstance(done.exception, UsageError)
+    assert "a game has an object" in str(done.exception)
 
 
 def test_a_fresh_clone_has_a_controller_that_needs_no_sight_of_the_object(
