@@ -104,6 +104,10 @@ class ModelFields:
         """Copies of all fields that may differ."""
         return {name: field.copy() for name, field in self._fields.items()}
 
+    def of(self, index: int) -> dict[str, Array]:
+        """Fields of one environment."""
+        return {name: field[index] for name, field in self._fields.items()}
+
     def restore(self, values: Mapping[str, Any]) -> None:
         """Inverse of `snapshot`. Values of earlier versions lack the object's mass: it was that of the body."""
         thing = self._layout.object
