@@ -3,7 +3,6 @@
 import contextlib
 import os
 from collections.abc import Mapping
-from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -199,7 +198,7 @@ def play_game(
     partners = found.world.recipe.skill.partners
     human = [*partners.held_out, *partners.training][0]
     plan = Plan(found.task, human, known=False, mass=mass, share=share, seed=request.seed)
-    with closing(SingleGame(found.world, found.student, NOMINAL | {ROBOT: found.robot}, plan)) as game:
+    with contextlib.closing(SingleGame(found.world, found.student, NOMINAL | {ROBOT: found.robot}, plan)) as game:
         title = f"{skill.manifest.recipe}: {plan.task}, {game.mass:.0f} kg, partner {human}, seed {request.seed}"
         tell(console, title)
         made = ""

@@ -13,6 +13,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
+from iowbc.arrays import Array
 from iowbc.errors import NoRenderer
 from iowbc.evaluation.report.aggregate import case_names
 from iowbc.evaluation.trials.plan import Trial
@@ -110,11 +111,16 @@ class Filming:
             self._renderer.close()
 
 
+def velocity_text(velocity: Array) -> str:
+    """A velocity command, (3,) [m/s, m/s, rad/s], in words."""
+    forward, left, turn = velocity
+    return f"v {forward:+.2f} {left:+.2f} m/s, turn {turn:+.2f} rad/s"
+
+
 def command_line(signals: dict[str, Any], seconds: float) -> str:
     """Time and command of the first environment, in words."""
-    forward, left, turn = signals["commanded_velocity"][0]
     height, pitch = float(signals["height_command"][0, 0]), float(signals["torso_pitch_command"][0, 0])
-    walk = f"v {forward:+.2f} {left:+.2f} m/s, turn {turn:+.2f} rad/s"
+    walk = velocity_text(signals["commanded_velocity"][0])
     return f"{seconds:4.1f} s   {walk}   H {height:.2f} m, pitch {pitch:+.2f} rad"
 
 

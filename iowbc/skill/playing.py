@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from iowbc.evaluation.films import Filming, written_film
+from iowbc.evaluation.films import Filming, velocity_text, written_film
 from iowbc.evaluation.play import in_window, require_display
 from iowbc.skill.single_game import SingleGame
 
@@ -51,6 +51,5 @@ def _state_line(game: SingleGame, seconds: float) -> str:
     now, lower = game.batch.now, game.lower
     way = f"{now.covered[0]:.1f} of {now.covered[0] + now.left[0]:.1f} m"
     force = np.linalg.norm(lower.simulation.state.partner_force[0, :2])
-    forward, left, turn = lower.memory.command[0, :3]
-    walk = f"v {forward:+.2f} {left:+.2f} m/s, turn {turn:+.2f} rad/s"
+    walk = velocity_text(lower.memory.command[0, :3])
     return f"{seconds:4.1f} s   {way}   partner {force:2.0f} N   {walk}"

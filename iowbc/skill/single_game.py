@@ -56,7 +56,7 @@ class SingleGame:
         return float(self.lower.simulation.drawn["object_mass"][0])
 
     def reset(self) -> None:
-        """Begins the game anew, with the same draws."""
+        """Restart the game with the same random draws."""
         self._seen = self._game.reset()
         self.steps, self.ending = 0, ""
 

@@ -1,4 +1,4 @@
-"""What a page is told of its scenes, without a browser."""
+"""Scenes of the web page's simulation, compared with Python's without a browser."""
 
 import mujoco
 import numpy as np
