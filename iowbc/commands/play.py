@@ -50,6 +50,23 @@ MASS = 4.0
 
 
 @dataclass(frozen=True)
+class Held:
+    """Fixed quantities of a skill's game; drawn if empty."""
+
+    mass: float | None = None
+    """Mass of the object [kg]."""
+    share: float | None = None
+    """Share of the weight that the human bears."""
+    partner: str | None = None
+    """Behaviour of the human; empty: the first that the skill has not met in training."""
+
+    def require_playable(self, request: PlayRequest) -> None:
+        """Raises UsageError for a game without an object or with random disturbances."""
+        if self.mass == 0.0 or request.disturbances:
+            raise UsageError("a game has an object (--mass above 0) and no random --disturbances: its human disturbs")
+
+
+@dataclass(frozen=True)
 class Planned:
     """Recipe and cached artifacts of a recipe file that is played; empty for a key, a name or a folder."""
 
@@ -81,6 +98,10 @@ def play(
             help="Share of the weight that the partner bears (default: 0; drawn in a skill's game).", min=0.0, max=1.0
         ),
     ] = None,
+    partner: Annotated[
+        str | None,
+        typer.Option(help="Human of a skill's game (default: one not met in training).", metavar="BEHAVIOUR"),
+    ] = None,
     seed: Annotated[int, typer.Option(min=0, max=2**32 - 1)] = 0,
     disturbances: Annotated[bool, typer.Option("--disturbances", help="Enable random disturbances.")] = False,
     video: Annotated[
@@ -100,16 +121,19 @@ def play(
         disturbances=disturbances,
         video=video,
     )
+    held = Held(mass, partner_share, partner)
     if page is not None:
-        play_on_web(store, console, word, stage, request, page)
+        play_on_web(store, console, word, stage, request, held, page)
         return
     options.require_extra("train", "iowbc play")
     close_on_termination()
     plan = planned(store, word)
     skill = skill_to_play(store, word, stage, plan)
     if skill is not None:
-        play_game(store, console, skill, request, mass, partner_share)
+        play_game(store, console, skill, request, held)
         return
+    if partner is not None:
+        raise UsageError(f"{word}: --partner is the human of a skill's game, and this names no skill")
     source = named_source(store, console, word, stage, request.scene, plan)
 
     from iowbc.evaluation.play import play as play_episode
@@ -124,7 +148,9 @@ def play(
     tell(console, f"{outcome.ending} after {outcome.seconds:.1f} of {episode.duration:.1f} s{made}")
 
 
-def play_on_web(store: Store, console: Console, word: str, stage: str | None, request: PlayRequest, port: int) -> None:
+def play_on_web(
+    store: Store, console: Console, word: str, stage: str | None, request: PlayRequest, held: Held, port: int
+) -> None:
     """Serve the viewer in the browser until interrupted. Raises `UsageError` where it cannot begin."""
     if request.video is not None:
         raise UsageError("--web and --video exclude each other: open the page, or make a film")
@@ -147,9 +173,12 @@ def play_on_web(store: Store, console: Console, word: str, stage: str | None, re
     if skill is not None:
         from iowbc.live.game import GamePanel, GameRequest, GameSession
 
+        held.require_playable(request)
+        if held.partner is not None:
+            raise UsageError("--web and --partner exclude each other: on the page you are the human")
         found = _playable_skill(store, skill, request.scene)
         tell(console, f"skill of {skill.manifest.recipe}: you are its partner")
-        first = GameRequest(found.task, request.seed)
+        first = GameRequest(found.task, request.seed, mass=held.mass, share=held.share)
         with GameSession(found.world, found.student, found.robot, first) as game, serving(port) as server:
             Page(server, game, panel=GamePanel).run(ready)
         return
@@ -181,23 +210,21 @@ def skill_to_play(store: Store, word: str, stage: str | None, plan: Planned = Pl
     return None
 
 
-def play_game(
-    store: Store, console: Console, skill: Artifact, request: PlayRequest, mass: float | None, share: float | None
-) -> None:
-    """Play a game of a skill in the viewer or as a film, with a human that the skill has not met in training and that
-    alone knows the path. `mass` [kg], `share`: drawn if empty. Raises `UsageError`."""
-    if mass == 0.0 or request.disturbances:
-        raise UsageError("a game has an object (--mass above 0) and no random --disturbances: its human disturbs")
+def play_game(store: Store, console: Console, skill: Artifact, request: PlayRequest, held: Held) -> None:
+    """Play a game of a skill in the viewer or as a film; its human alone knows the path. Raises `UsageError`."""
+    held.require_playable(request)
 
     from iowbc.skill.game import NOMINAL, ROBOT
-    from iowbc.skill.plan import Plan
+    from iowbc.skill.plan import AGENT, Plan
     from iowbc.skill.playing import film_game, show_game
     from iowbc.skill.single_game import SingleGame
 
     found = _playable_skill(store, skill, request.scene)
     partners = found.world.recipe.skill.partners
-    human = [*partners.held_out, *partners.training][0]
-    plan = Plan(found.task, human, known=False, mass=mass, share=share, seed=request.seed)
+    humans = [kind for kind in (*partners.held_out, *partners.training) if kind != AGENT]
+    human = held.partner or humans[0]
+    require_known(human, "human of the skill", humans)
+    plan = Plan(found.task, human, known=False, mass=held.mass, share=held.share, seed=request.seed)
     with contextlib.closing(SingleGame(found.world, found.student, NOMINAL | {ROBOT: found.robot}, plan)) as game:
         title = f"{skill.manifest.recipe}: {plan.task}, {game.mass:.0f} kg, partner {human}, seed {request.seed}"
         tell(console, title)

@@ -38,6 +38,10 @@ class GameRequest:
     seed: int = 0
     robot: str = "skill"
     """One of `ROBOTS`."""
+    mass: float | None = None
+    """Mass of the object [kg]; drawn if empty."""
+    share: float | None = None
+    """Share of the weight that the person bears; drawn if empty."""
 
 
 class GameSession(Played):
@@ -58,7 +62,8 @@ class GameSession(Played):
 
     def _open(self, request: GameRequest) -> None:
         rule = ROBOTS[request.robot]
-        plan = Plan(request.task, PERSON, known=False, seed=request.seed, rule=rule)
+        mass, share = request.mass, request.share
+        plan = Plan(request.task, PERSON, known=False, mass=mass, share=share, seed=request.seed, rule=rule)
         networks = NOMINAL | {"robot": self._skill if rule is None else None}
         self.request, self._game = request, SingleGame(self.world, self._student, networks, plan)
         self._lower = self._game.lower
@@ -140,7 +145,7 @@ class GamePanel(ControlPanel):
 
     @property
     def conditions(self) -> GameRequest:
-        return GameRequest(self.task.value, int(self.seed.value), self.rival.value)
+        return replace(self._session.request, task=self.task.value, seed=int(self.seed.value), robot=self.rival.value)
 
     def steer(self) -> None:
         """The mouse steers."""

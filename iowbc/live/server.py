@@ -114,9 +114,6 @@ def within(control: Any, value: Any) -> Any:
     return type(now)(min(max(value, -math.inf if low is None else low), math.inf if high is None else high))
 
 
-HOST = "127.0.0.1"
-
-
 class LocalServer(viser.ViserServer):  # type: ignore[misc]
     """A server whose page cannot be shared."""
 
@@ -133,7 +130,7 @@ def serving(port: int) -> Iterator[LocalServer]:
     # Browsers open connections in advance and close them unused, which is not an error.
     logging.getLogger("websockets.server").setLevel(logging.CRITICAL)
     with redirect_stdout(io.StringIO()), own_pages_only():  # viser prints a banner
-        server = LocalServer(host=HOST, port=port, verbose=False, label="iowbc")
+        server = LocalServer(host=LOCAL_NAMES[0], port=port, verbose=False, label="iowbc")
     try:
         if port and server.get_port() != port:
             raise UsageError(f"port {port} is taken; try another --port")

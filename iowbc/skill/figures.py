@@ -3,11 +3,11 @@
 import numpy as np
 
 from iowbc.arrays import Array, Indices
+from iowbc.robot.rotations import TINY
 from iowbc.skill.situation import GameState
 
 HIGH = 90.0
 """Percentile of the partner's force."""
-TINY = 1e-9
 FIGURES = (
     *("success", "time", "path_error", "path_error_max", "yaw_error", "height_error", "tilt", "internal_force"),
     *("partner_force_mean", "partner_force_p90", "partner_work", "load_share", "fallen", "dropped", "touched"),

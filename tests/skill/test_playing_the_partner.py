@@ -31,8 +31,8 @@ def start(
     skill = TeacherNetwork(44 + 6 * world.recipe.skill.robot.history, 11, [8], "elu", 5.0).requires_grad_(False)
     begun: list[GameSession] = []
 
-    def starter(task: str = "lift_straight", robot: str = "stands", seed: int = 1) -> GameSession:
-        begun.append(GameSession(world, student, skill, GameRequest(task, seed, robot)))
+    def starter(task: str = "lift_straight", robot: str = "stands", seed: int = 1, **held: float) -> GameSession:
+        begun.append(GameSession(world, student, skill, GameRequest(task, seed, robot, **held)))
         return begun[-1]
 
     yield starter
@@ -78,6 +78,16 @@ def test_a_drag_moves_the_spring_to_the_pointer_and_pulls_there(
     arrow = session.track.moments[-1].forces[0]
     assert (arrow.kind, arrow.force[2]) == ("partner", 0.0)
     np.testing.assert_array_equal(arrow.force[:2], force[:2])
+
+
+def test_mass_and_share_stay_as_asked_in_the_next_game(start: Callable[..., GameSession]) -> None:
+    session = start(mass=2.5, share=0.25)
+    with serving(0) as server:
+        panel = GamePanel(server.gui, session, ())
+        panel.press("next task")
+        session.begin(panel.conditions)
+    drawn = session._lower.simulation.drawn
+    assert (session.request.task, drawn["object_mass"][0], drawn["partner_share"][0]) == ("lift_corridor", 2.5, 0.25)
 
 
 def test_the_force_is_bounded_however_far_the_pointer_is(start: Callable[..., GameSession]) -> None:

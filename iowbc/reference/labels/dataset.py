@@ -36,9 +36,8 @@ class Dataset:
     """Distance of the centre of mass inside the support polygon, shape (n,) [m]."""
     reached: Array
     """Height reached, shape (n,) [m]."""
-    rejected_arm: Array
     rejected_command: Array
-    """Samples without a label, shapes (r, 14), (r, 2)."""
+    """Height [m] and torso pitch [rad] of samples without a label, shape (r, 2)."""
     rejected_index: Array
     """Sample numbers of the rejected samples, shape (r,)."""
     rejected_reason: Array
@@ -81,7 +80,6 @@ def assemble(plan: SamplePlan, result: Shard) -> Dataset:
         arm=np.stack([sample.arm for sample in kept]),
         command=np.stack([sample.command for sample in kept]),
         **result.labels,
-        rejected_arm=np.array([sample.arm for sample in rejected]).reshape(-1, len(plan.rest)),
         rejected_command=np.array([sample.command for sample in rejected]).reshape(-1, 2),
         rejected_index=result.rejected,
         rejected_reason=np.array(result.reasons, dtype=np.str_),
