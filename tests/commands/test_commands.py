@@ -15,7 +15,7 @@ from sealing import sealed_anew
 
 from iowbc.commands.compare import compare, report
 from iowbc.commands.lookup import open_artifact, points_of
-from iowbc.commands.play import named_source
+from iowbc.commands.playable import named_source
 from iowbc.errors import UsageError
 from iowbc.pipeline.store.artifact import write_manifest
 from iowbc.pipeline.store.runs import Runs

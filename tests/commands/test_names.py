@@ -12,7 +12,7 @@ import pytest
 from iowbc import open_artifact
 from iowbc.commands import completion
 from iowbc.commands.lookup import named
-from iowbc.commands.play import playable
+from iowbc.commands.playable import playable
 from iowbc.deploy.exported_folder import exported_folder
 from iowbc.errors import ContractBroken
 from iowbc.pipeline.store.runs import Runs

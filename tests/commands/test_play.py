@@ -16,7 +16,7 @@ from rich.console import Console
 
 from iowbc.commands import printed
 from iowbc.commands.lookup import in_training
-from iowbc.commands.play import _whole_source, named_source
+from iowbc.commands.playable import named_source, whole_source
 from iowbc.commands.printed import film_progress
 from iowbc.errors import UsageError
 from iowbc.evaluation.play import requested_episode
@@ -70,7 +70,7 @@ def test_only_a_policy_that_sees_s_priv_is_played_with_its_parts_in_a_users_file
     values["task"]["observation"]["own"] = {"mine": own_part(tmp_path)}
     manifest = SimpleNamespace(stage=stage, key="0" * 64)
     artifact: Any = SimpleNamespace(manifest=manifest, ingredients={}, recipe=values, folder=tmp_path)
-    assert len(_whole_source(Store(Runs(tmp_path)), artifact).world.recipe.task.observation.own) == told
+    assert len(whole_source(Store(Runs(tmp_path)), artifact).world.recipe.task.observation.own) == told
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])

@@ -8,7 +8,7 @@ from workplace import Workplace
 
 from iowbc.commands.compare import trainings_table
 from iowbc.commands.lookup import in_training
-from iowbc.commands.play import playable
+from iowbc.commands.playable import playable
 from iowbc.commands.results import headline, next_commands, policy_stages
 from iowbc.commands.ui import view
 from iowbc.learning.curves import Curves

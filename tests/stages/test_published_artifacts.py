@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from iowbc.cli import app
 from iowbc.commands.lookup import named
-from iowbc.commands.play import playable, skill_to_play
+from iowbc.commands.playable import playable, skill_to_play
 from iowbc.control.sensors import Measured
 from iowbc.deploy.controller import Controller
 from iowbc.errors import UsageError

@@ -1,0 +1,161 @@
+"""What a word names to be played: a policy with its world, or a skill with its controller."""
+
+import contextlib
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+
+from iowbc.commands.lookup import in_training, input_artifact, input_of, named, policy_stages, world_of
+from iowbc.commands.printed import tell
+from iowbc.commands.request import prepared
+from iowbc.deploy.exported_folder import CONTRACT
+from iowbc.errors import UsageError, require_known
+from iowbc.pipeline.stage_plan import Options
+from iowbc.pipeline.store.artifact import Artifact
+from iowbc.pipeline.store.last_used import recall, require_whole
+from iowbc.pipeline.store.store import Store
+from iowbc.recipe.evaluation.evaluation import Evaluation
+from iowbc.recipe.reading.loading import SUFFIXES, load_recipe
+from iowbc.recipe.recipe import Recipe
+from iowbc.stages.inputs import policy_stage
+
+if TYPE_CHECKING:
+    from iowbc.evaluation.play import Source
+    from iowbc.learning.networks import TeacherNetwork
+    from iowbc.skill.lower_layer import Student
+    from iowbc.task.specification import Specification
+
+SKILL = "skill"
+
+
+@dataclass(frozen=True)
+class Planned:
+    """Recipe and cached artifacts of a recipe file that is played; empty for a key, a name or a folder."""
+
+    recipe: Recipe | None = None
+    artifacts: Mapping[str, Artifact] = field(default_factory=dict)
+    """Stored artifacts that its plan uses, by stage."""
+
+
+def planned(store: Store, word: str) -> Planned:
+    """The plan of a recipe's file. Raises `RecipeError` for one that is wrong."""
+    if Path(word).suffix not in SUFFIXES or not os.path.isfile(word):
+        return Planned()
+    loaded = load_recipe(word)
+    steps = prepared(loaded, store.runs, Options()).plan()
+    return Planned(loaded.recipe, {step.stage.name: step.artifact for step in steps if step.cached and step.artifact})
+
+
+def skill_to_play(store: Store, word: str, stage: str | None, plan: Planned = Planned()) -> Artifact | None:
+    """The skill that a word and `--stage` name; None where they name no skill, or another stage."""
+    if stage not in (None, SKILL) or os.path.isdir(word):
+        return None
+    if plan.recipe is not None:
+        return plan.artifacts.get(SKILL)
+    with contextlib.suppress(UsageError):  # a first training has nothing finished yet
+        return named(store, word).usable.get(SKILL)
+    return None
+
+
+@dataclass(frozen=True)
+class PlayableSkill:
+    """A trained skill, with what it commands, and the task that is played first."""
+
+    world: "Specification"
+    student: "Student"
+    robot: "TeacherNetwork"
+    task: str
+
+
+def playable_skill(store: Store, skill: Artifact, scene: str) -> PlayableSkill:
+    """A skill and the first task of a scene. Raises `UsageError`."""
+    from iowbc.learning.storage import load_teacher
+    from iowbc.skill.lower_layer import load_student
+
+    recipe = Recipe.model_validate(skill.recipe)
+    generator, student = (input_of(store, skill, name) for name in ("rg-fit", policy_stage(recipe)))
+    if student is None:
+        raise UsageError(f"{skill.folder}: this skill read no controller; run its recipe again")
+    require_whole(store.runs, [skill, student, *([generator] if generator else [])])
+    first = {getattr(recipe.skill.tasks, name).scene: name for name in reversed(recipe.skill.tasks.names)}
+    require_known(scene, "scene with a transport task", first)
+    world = world_of(skill.recipe, generator).deployed
+    robot = load_teacher(skill.folder, "robot")[0]
+    return PlayableSkill(world, load_student(student.folder, world), robot, first[scene])
+
+
+def named_source(
+    store: Store,
+    console: Console,
+    word: str,
+    stage: str | None,
+    scene: str | None = None,
+    plan: Planned | None = None,
+) -> "Source":
+    """The source that a word and `--stage` denote; prints a line if it is still in training. Raises `UsageError`, also
+    for a `scene` that its recipe lacks. `plan`: the word's plan, if known.
+
+    A recipe file denotes the artifacts that `iowbc plan` reports as cached. The section `eval` of that file, or of the
+    recipe's last run for a name, sets how they are played.
+    """
+    from iowbc.evaluation.play import Source, exported_source, with_evaluation
+
+    if os.path.isfile(Path(word, CONTRACT)):
+        return exported_source(Path(word))
+    training = in_training(store, word, stage)
+    if training is not None and training.recipe is not None:
+        tell(console, training.text)
+        generator = input_artifact(store, training.ingredients, "rg-fit", f"{training.stage} {training.key[:12]}")
+        return Source(world_of(training.recipe, generator), training.checkpoint, training.key)
+    plan = plan or planned(store, word)
+    try:
+        artifact = playable(store, word, stage, plan)
+    except UsageError:
+        if training is None:
+            raise
+        text = "there is neither a checkpoint that can be played nor a finished one; `iowbc status` tells how far it is"
+        raise UsageError(f"{training.text}; {text}") from None
+    if training is not None:
+        tell(console, f"{training.text}; this is a finished one")
+    known = {} if plan.recipe else recall(store.runs, word.partition("/")[0]).recipe
+    asked = plan.recipe.eval if plan.recipe else Evaluation.model_validate(known["eval"]) if "eval" in known else None
+    require_whole(store.runs, [artifact])
+    if artifact.published:
+        tell(console, f"{artifact.manifest.stage} of {artifact.manifest.recipe}, as it came with the repository")
+    scenes = artifact.recipe.get("simulation", {}).get("scenes", {})
+    if scene is not None and scenes:
+        require_known(scene, "scene", [*scenes, *(asked.scenes if asked else ())])
+    source = whole_source(store, artifact)
+    return source if asked is None else with_evaluation(source, asked)
+
+
+def whole_source(store: Store, artifact: Artifact) -> "Source":
+    """A stored, verified policy with the world of its own recipe and the reference generator that it was trained with.
+    Raises `UsageError` if the generator is missing or damaged."""
+    from iowbc.evaluation.play import Source, exported_source
+
+    if artifact.manifest.stage == "export":
+        return exported_source(artifact.folder)
+    generator = input_of(store, artifact, "rg-fit")
+    if generator is not None:
+        require_whole(store.runs, [generator])
+    world = world_of(artifact.recipe, generator)
+    student = artifact.manifest.stage == "distill" or world.recipe.teacher.history is not None
+    return Source(world.deployed if student else world, artifact.folder)
+
+
+def playable(store: Store, word: str, stage: str | None, plan: Planned = Planned()) -> Artifact:
+    """The policy that a word and `--stage` name, before all one that its file plans to use. Raises `UsageError`."""
+    leave = any(name in plan.artifacts for name in policy_stages())
+    found = plan.artifacts if leave else named(store, word).usable
+    ready = [name for name in policy_stages() if name in found]
+    if not ready or (stage is not None and stage not in ready):
+        raise UsageError(
+            f"{word}: no policy {f'of stage {stage} ' if stage else ''}to play; "
+            f"stages that leave one: {', '.join(policy_stages())}; finished: {', '.join(found) or 'none'}"
+        )
+    return found[stage or ready[0]]
