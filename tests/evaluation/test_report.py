@@ -353,6 +353,7 @@ def test_the_comparison_has_a_panel_for_each_thing_that_was_evaluated() -> None:
     lifting, heavy = trials_of("IO-WBC", "lifting", {4.0: 5}), trials_of("IO-WBC", "heavy", {18.0: 1}, "tyre")
     for trials, titles in (
         (lifting, ["(a) error norm, lifting", "(b) load capacity at 80 % success", "(c) success rate"]),
+        (trials_of("IO-WBC", "lifting", {4.0: 1}), ["(a) error norm, lifting", "(b) success rate"]),
         (heavy, ["(a) success rate"]),
     ):
         figure = comparison(aggregate(trials), 0.8)

@@ -18,7 +18,7 @@ from iowbc.evaluation.report.aggregate import stepping_commanded, suites_of, var
 from iowbc.evaluation.report.capacity import Capacities, load_capacities, push_capacities
 from iowbc.evaluation.report.captions import conditions
 from iowbc.evaluation.report.columns import STANDS_STILL
-from iowbc.evaluation.report.error_tables import NUMBERS
+from iowbc.evaluation.report.error_tables import NUMBERS, SWEPT
 from iowbc.evaluation.trials.errors import ERRORS, error_norm
 from iowbc.results.picture import COLOURS
 
@@ -33,6 +33,8 @@ PANEL_WIDTH, SMALLEST_WIDTH = 3.75, 7.5
 """Width of a panel of the comparison, and minimum width of the whole figure [inch]."""
 VARIANTS_PER_PANEL = 4
 """Number of variants whose bars fit into a panel of `PANEL_WIDTH`; with more, it is wider."""
+SUITES_PER_PANEL = 3
+"""Number of suites whose capacities fit into a panel."""
 LONGEST_TEXT = 5
 """With more than `VARIANTS_PER_PANEL` variants, texts above bars with more characters than this are rotated."""
 TITLE_WIDTH = 110
@@ -45,6 +47,8 @@ HEADROOM = 0.15
 """Space above the highest point, as a fraction of its height."""
 FAILURE_SPACING = 0.035
 """Distance between the survivor marks of two variants, as a fraction of the panel height."""
+COUNT_WIDTH = 0.07
+"""Width of a survivor count, as a fraction of the range of masses."""
 WHISKERS = {"ecolor": "black", "capsize": 3, "elinewidth": 1.0}
 """Style of intervals on bars."""
 
@@ -70,11 +74,14 @@ def errors_against_mass(summary: pd.DataFrame, suite: str) -> Figure:
 def comparison(summary: pd.DataFrame, capacity_rate: float) -> Figure:
     """Error norm over lifting mass and over pushing mass, load capacity, success in the heavy tasks.
 
-    One panel for each of these that was evaluated.
+    One panel for each of these that was evaluated; of the capacities those that a variant has.
     """
     sweeps = [suites_of(summary, kind)[0] for kind in NUMBERS if suites_of(summary, kind)]
+    capacities = load_capacities(summary, capacity_rate)
+    carried = {suite for own in capacities.values() for suite, capacity in own.items() if capacity.value is not None}
+    carrying = [suite for suite in suites_of(summary, *SWEPT) if suite in carried]
     bars = max(1.0, len(variants_of(summary)) / VARIANTS_PER_PANEL)
-    widths = [*(1.0 for _ in sweeps), *[bars] * bool(sweeps), bars]
+    widths = [*(1.0 for _ in sweeps), *[bars * max(1.0, len(carrying) / SUITES_PER_PANEL)] * bool(carrying), bars]
     figure, panels = _row(PANEL_WIDTH, widths, ConstrainedLayoutEngine(wspace=0.06))
     for axes, suite in zip(panels, sweeps, strict=False):
         chosen = summary[summary["suite"] == suite]
@@ -83,8 +90,8 @@ def comparison(summary: pd.DataFrame, capacity_rate: float) -> Figure:
             axes, chosen, variants_of(summary), "norm", float(still), lambda row: float(error_norm(np.array(row)))
         )
         axes.set(title=f"error norm, {suite}", xlabel="mass [kg]", ylabel="norm of the four errors [SI units]")
-    if sweeps:
-        _capacity_bars(panels[-2], load_capacities(summary, capacity_rate), sweeps)
+    if carrying:
+        _capacity_bars(panels[-2], capacities, carrying)
         panels[-2].set(title=f"load capacity at {100 * capacity_rate:.0f} % success", ylabel="mass [kg]")
     _success_panel(panels[-1], _heaviest(summary), "success rate")
     walked = any(stepping_commanded(summary[summary["suite"] == suite]) for suite in sweeps)
@@ -198,7 +205,7 @@ def _sweep_panel(
             paper = {mass: row.get(variant) for mass, row in TABLES[chosen["kind"].iloc[0]].items()}
             points = {mass: of_paper(errors) for mass, errors in paper.items() if errors is not None}
             axes.plot(list(points), list(points.values()), linestyle=":", markerfacecolor="none", **style)
-        _mark_survivors(axes, rows, place, style["color"])
+        _mark_survivors(axes, rows, place, style["color"], COUNT_WIDTH * float(np.ptp(chosen["mass"])))
     axes.axhline(still, label=STANDS_STILL, zorder=0, color="0.55", linestyle="--", linewidth=1.2)
     axes.update_datalim([(0.0, still)], updatex=False)
     tidy(axes)
@@ -234,14 +241,18 @@ def _capacity_bars(axes: Axes, found: Capacities, names: Sequence[str]) -> None:
     draw_bars(axes, heights, texts, [textwrap.fill(name, LABEL_WIDTH) for name in names], {})
 
 
-def _mark_survivors(axes: Axes, rows: pd.DataFrame, place: int, colour: str) -> None:
-    """Mark masses that not all trials survived at the upper edge, one line per variant: survivors, or a cross."""
+def _mark_survivors(axes: Axes, rows: pd.DataFrame, place: int, colour: str, width: float) -> None:
+    """Mark masses that not all trials survived at the upper edge, one line per variant: survivors, or a cross. Counts
+    that would overlap are left out."""
     style: dict[str, Any] = {"color": colour, "transform": axes.get_xaxis_transform(), "in_layout": False}
     height, failed = 0.98 - FAILURE_SPACING * place, rows[rows["survived"] == 0]["mass"]
     axes.plot(failed, [height] * len(failed), "x", clip_on=False, **style)
+    free = -np.inf
     for row in rows[(rows["survived"] > 0) & (rows["survived"] < rows["trials"])].itertuples():
-        count = f"{row.survived}/{row.trials}"
-        axes.text(float(row.mass), height, count, ha="center", va="center", fontsize=7, **style)
+        if row.mass >= free:
+            count = f"{row.survived}/{row.trials}"
+            axes.text(float(row.mass), height, count, ha="center", va="center", fontsize=7, **style)
+            free = row.mass + width
 
 
 def _from_zero(axes: Axes) -> None:
