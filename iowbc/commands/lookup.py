@@ -13,7 +13,7 @@ from iowbc.errors import UsageError, nearest
 from iowbc.files import write_whole
 from iowbc.pipeline.console.wording import ago
 from iowbc.pipeline.store.artifact import INGREDIENTS, RECIPE, Artifact
-from iowbc.pipeline.store.last_used import LastUsed, recall
+from iowbc.pipeline.store.last_used import LastUsed, recall, require_results
 from iowbc.pipeline.store.locks import holder
 from iowbc.pipeline.store.runs import Runs, read_json, read_yaml
 from iowbc.pipeline.store.store import Store
@@ -257,6 +257,7 @@ def policy_of(store: Store, evaluation: Artifact) -> Artifact:
     """The policy that an evaluation played. Raises `UsageError`."""
     for name, stage in reversed(STAGES.items()):
         if stage.trained_by and (policy := input_of(store, evaluation, name)) is not None:
+            require_results(store.runs, policy)
             return policy
     raise UsageError(f"{evaluation.folder}: this evaluation read no policy; run its recipe again")
 

@@ -16,7 +16,7 @@ from iowbc.deploy.exported_folder import CONTRACT
 from iowbc.errors import UsageError, require_known
 from iowbc.pipeline.stage_plan import Options
 from iowbc.pipeline.store.artifact import Artifact
-from iowbc.pipeline.store.last_used import recall, require_whole
+from iowbc.pipeline.store.last_used import recall, require_results, require_whole
 from iowbc.pipeline.store.store import Store
 from iowbc.recipe.evaluation.evaluation import Evaluation
 from iowbc.recipe.reading.loading import SUFFIXES, load_recipe
@@ -158,4 +158,6 @@ def playable(store: Store, word: str, stage: str | None, plan: Planned = Planned
             f"{word}: no policy {f'of stage {stage} ' if stage else ''}to play; "
             f"stages that leave one: {', '.join(policy_stages())}; finished: {', '.join(found) or 'none'}"
         )
-    return found[stage or ready[0]]
+    chosen = stage or next((name for name in ready if found[name].whole), ready[0])
+    require_results(store.runs, found[chosen])
+    return found[chosen]

@@ -33,6 +33,8 @@ class Planner:
     options: Options
     origins: Mapping[tuple[str, str], "Planner"]
     """Planners of the recipes that make borrowed artifacts, by stage and input; see `planner_for`."""
+    whole: bool = False
+    """A stage that runs reads the last artifact: a published one does not do that leaves out large files."""
 
     def __post_init__(self) -> None:
         self.robot_digest = folder_digest(self.robot)
@@ -47,7 +49,9 @@ class Planner:
             inputs = {
                 name: steps[name].artifact if steps[name].cached else None for name in stage.reads(self.loaded.recipe)
             }
-            step = self.decide(stage, {**inputs, **self.borrowed(stage, known)})
+            step = self.decide(stage, {**inputs, **self.borrowed(stage, known)}, whole=self.read_whole(stage))
+            if not step.cached and self._want_whole(stage, known):
+                return self.plan(known)
             unknown = [name for name in inputs if not steps[name].cached and steps[name].expected is None]
             steps[stage.name] = replace(step, expected=None, roughly=step.guess) if unknown else step
         for stage in reversed(self.stages):
@@ -57,6 +61,23 @@ class Planner:
                     steps[name] = replace(steps[name], reasons=(f"{NOT_WHOLE}; {stage.name} reads it",))
         known[self] = list(steps.values())
         return known[self]
+
+    def read_whole(self, stage: Stage) -> bool:
+        """True if only a whole artifact of a stage does."""
+        return self.whole and stage is self.stages[-1]
+
+    def _want_whole(self, stage: Stage, known: "Plans") -> bool:
+        """Plans the borrowed artifacts anew that a stage would read and that are not whole; true if there are any.
+
+        Raises `RecipeError` for one that the recipe names by its key."""
+        lacking = {name for name, one in self.borrowed(stage, known).items() if one is not None and not one.whole}
+        for name in lacking:
+            origin = self.origins.get((stage.name, name))
+            if origin is None:
+                raise wrong_origin(self.loaded, stage.borrows(self.loaded.recipe)[name], NOT_WHOLE)
+            origin.whole = True
+            known.clear()
+        return bool(lacking)
 
     def borrowed(self, stage: Stage, known: "Plans | None" = None) -> dict[str, Artifact | None]:
         """The artifacts of other recipes that a stage reads, by their names among the inputs.

@@ -95,7 +95,7 @@ class Runner:
             for stage in self.planner.stages:
                 if self.interrupted():
                     raise Interrupted
-                self.artifacts[stage.name] = self._artifact(stage)
+                self.artifacts[stage.name] = self._artifact(stage, whole=self.planner.read_whole(stage))
                 remember(self.store.runs, self.loaded, self.artifacts[stage.name])
         except Exception as error:
             if isinstance(error, (PipelineFailed, Interrupted)) or not is_disk_full(error):

@@ -77,20 +77,26 @@ def test_a_damaged_beginning_is_refused(workplace: Workplace, told: list[Path | 
 
 
 def test_what_was_published_without_its_state_begins_one_all_the_same(
-    workplace: Workplace, told: list[Path | None], monkeypatch: pytest.MonkeyPatch
+    workplace: Workplace, told: list[Path | None]
 ) -> None:
     first = workplace.run()["teacher"]
     start = f"teacher.start={first.manifest.key}"
-    monkeypatch.setattr("iowbc.pipeline.store.publishing.KINDS", frozenset())
-    published = publish(workplace.store.runs, first)
-    assert first.manifest.key in str(published)
+    publish(workplace.store.runs, first, ["started_at.json"])
     shutil.rmtree(first.folder)
     second = workplace.run(start, "teacher.gamma=0.9")["teacher"]
     found = workplace.store.find("teacher", first.manifest.key, published=True)
     assert found is not None
-    assert not found.whole
     assert told == [None, found.folder]
     assert second.ingredients["inputs"][START] == first.manifest.digest
+
+
+def test_what_was_published_without_its_results_begins_none_by_its_key(workplace: Workplace) -> None:
+    first = workplace.run()["teacher"]
+    publish(workplace.store.runs, first, ["result.json"])
+    shutil.rmtree(first.folder)
+    assert workplace.plan()["teacher"].cached
+    with pytest.raises(RecipeError, match=r"key 'teacher.start' = .*: its published artifact leaves out large files"):
+        workplace.plan(f"teacher.start={first.manifest.key}", "teacher.gamma=0.9")
 
 
 @pytest.fixture
@@ -115,6 +121,22 @@ def test_the_recipe_that_it_begins_from_runs_first_where_it_has_not(workplace: W
     assert "small" not in workplace.command("plan", second, "--until", "teacher").output
     loaded = workplace.planner().plan()
     assert [step.cached for step in loaded[:3]] == [True, True, True], "an ordinary run of the first recipe"
+
+
+def test_the_recipe_that_it_begins_from_runs_again_where_it_was_published_without_results(
+    workplace: Workplace, second: str
+) -> None:
+    made = workplace.command("run", second, "--until", "teacher")
+    assert made.code == 0, made.errors
+    for artifact in workplace.store.artifacts("teacher"):
+        publish(workplace.store.runs, artifact, ["result.json"])
+    shutil.rmtree(workplace.store.runs.store / "teacher")
+    assert "all stages are cached" in workplace.command("plan", second, "--until", "teacher").output
+    again = workplace.command("run", second, "--until", "teacher", "--force", "teacher")
+    assert again.code == 0, again.errors
+    assert [line for line in again.output.splitlines() if line in ("small:", "second:")] == ["small:", "second:"]
+    made_here = [one for one in workplace.store.artifacts("teacher") if not one.published]
+    assert [one.whole for one in made_here] == [True, True]
 
 
 def test_recipes_that_begin_from_each_other_are_refused(workplace: Workplace, second: str) -> None:
@@ -142,9 +164,9 @@ def test_a_recipe_that_is_not_there_is_refused_with_its_place(workplace: Workpla
 def test_a_recipe_that_several_begin_from_is_planned_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     decided, decide = Counter[tuple[Path, str | None, str]](), Planner.decide
 
-    def counted(self: Planner, stage: Stage, inputs: Any) -> StagePlan:
+    def counted(self: Planner, stage: Stage, inputs: Any, *, whole: bool) -> StagePlan:
         decided[self.loaded.file, self.options.until, stage.name] += 1
-        return decide(self, stage, inputs)
+        return decide(self, stage, inputs, whole=whole)
 
     monkeypatch.setattr(Planner, "decide", counted)
     experts = load_recipe(Path(__file__).parents[2] / "recipes" / "experts" / "quick.yaml")

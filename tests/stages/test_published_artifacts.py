@@ -36,7 +36,7 @@ PUBLISHED_TO = {
     "compliant_pace": "teacher",
     "compliant_steady": "teacher",
     "compliant_merged": "export",
-    "compliant_merged_seed_2": "teacher",
+    "compliant_merged_seed_2": "eval",
     "drake": "eval",
     "experts/quick": "distill",
     "experts/firm_push": "teacher",
@@ -94,6 +94,16 @@ def test_a_fresh_clone_has_a_controller_to_try(tmp_path: Path, monkeypatch: pyte
     folders = list((ROOT / "runs" / "published" / "export").iterdir())
     metrics = [json.loads((folder / "summary.json").read_text())["metrics"] for folder in folders]
     assert min(one["acceptance_survived"] for one in metrics) >= 4
+
+
+def test_what_was_published_without_weights_is_played_from_an_earlier_stage_or_refused(tmp_path: Path) -> None:
+    (tmp_path / "published").symlink_to(ROOT / "runs" / "published")
+    store = Store(Runs(tmp_path))
+    assert playable(store, "full_seed_1", None).manifest.stage == "distill"
+    with pytest.raises(UsageError, match=r"without settle.onnx, step.onnx; to make it anew: .* --force export"):
+        playable(store, "full_seed_1", "export")
+    with pytest.raises(UsageError, match=r"teacher of compliant_pace came .* without teacher.safetensors"):
+        playable(store, "compliant_pace", None)
 
 
 def test_a_fresh_clone_has_a_skill_whose_partner_one_can_be(tmp_path: Path) -> None:

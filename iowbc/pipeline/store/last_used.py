@@ -89,13 +89,28 @@ def require_whole(runs: Runs, artifacts: Iterable[Artifact]) -> None:
         try:
             artifact.verify()
         except Damaged as error:
-            made, words = artifact.manifest, ["iowbc", "run", str(artifact.folder / RECIPE)]
-            record = _record(runs, made.recipe)
-            if record is not None and made.stage in record.stages and record.stages[made.stage].key == made.key:
-                words[-1] = record.file or words[-1]
-                words += [word for override in record.overrides for word in ("--set", override)]
-            again = shlex.join([*words, *runs.option])
-            raise UsageError(f"{artifact.folder} is damaged: {error}; to make it anew: {again}") from None
+            text = f"{artifact.folder} is damaged: {error}; to make it anew: {_again(runs, artifact)}"
+            raise UsageError(text) from None
+
+
+def require_results(runs: Runs, artifact: Artifact) -> None:
+    """Raises `UsageError` for a published artifact that lacks results, with the command that makes it again."""
+    if not artifact.whole:
+        made = artifact.manifest
+        lacking = ", ".join(name for name in made.results if name in made.omitted)
+        again = _again(runs, artifact, "--until", made.stage, "--force", made.stage)
+        text = f"{made.stage} of {made.recipe} came with the repository without {lacking}"
+        raise UsageError(f"{text}; to make it anew: {again}")
+
+
+def _again(runs: Runs, artifact: Artifact, *options: str) -> str:
+    """The command that makes an artifact anew."""
+    made, words = artifact.manifest, ["iowbc", "run", str(artifact.folder / RECIPE)]
+    record = _record(runs, made.recipe)
+    if record is not None and made.stage in record.stages and record.stages[made.stage].key == made.key:
+        words[-1] = record.file or words[-1]
+        words += [word for override in record.overrides for word in ("--set", override)]
+    return shlex.join([*words, *options, *runs.option])
 
 
 def named_folder(runs: Runs, recipe: str, stage: str, artifact: Path) -> Path:
