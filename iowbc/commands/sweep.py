@@ -93,7 +93,10 @@ def ready(asked: Request, file: Path | None, most: int) -> tuple[Sweep, list[Pla
 def _require_origins(asked: Request, planners: Sequence[Planner]) -> None:
     """Raises `UsageError` where points begin from what another recipe has not made yet: they would all wait for it."""
     missing = [origin for one in planners for origin in in_order(one)[:-1]]
-    first = [Request(str(one.loaded.file), (), asked.runs, one.options).command() for one in missing]
+    first = [
+        Request(str(one.loaded.file), (), asked.runs, one.options).command([one.stages[-1].name] if one.whole else ())
+        for one in missing
+    ]
     if first:
         lines = "\n  ".join(dict.fromkeys(first))
         raise UsageError(f"the points begin from what is not made yet; first\n  {lines}")

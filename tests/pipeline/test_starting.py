@@ -132,6 +132,10 @@ def test_the_recipe_that_it_begins_from_runs_again_where_it_was_published_withou
         publish(workplace.store.runs, artifact, ["result.json"])
     shutil.rmtree(workplace.store.runs.store / "teacher")
     assert "all stages are cached" in workplace.command("plan", second, "--until", "teacher").output
+    refused = workplace.command("sweep", second, "--until", "teacher", "--set", "teacher.gamma=0.8,0.7")
+    assert refused.code == 2
+    (command,) = [line for line in refused.errors.splitlines() if "iowbc run" in line]
+    assert sorted(command.split()) == ["--force", "--until", "iowbc", "run", "small.yaml", "teacher", "teacher"]
     again = workplace.command("run", second, "--until", "teacher", "--force", "teacher")
     assert again.code == 0, again.errors
     assert [line for line in again.output.splitlines() if line in ("small:", "second:")] == ["small:", "second:"]
