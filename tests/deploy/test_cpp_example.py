@@ -15,7 +15,8 @@ from iowbc.deploy.contract import read_contract
 from iowbc.deploy.controller import Controller, Measured
 
 ROOT = Path(__file__).parents[2]
-PUBLISHED = {read_contract(folder).recipe: folder for folder in (ROOT / "runs" / "published" / "export").iterdir()}
+EXPORTED = (ROOT / "runs" / "published" / "export").glob("*/step.onnx")
+PUBLISHED = {read_contract(graph.parent).recipe: graph.parent for graph in EXPORTED}
 HEADER = "onnxruntime_cxx_api.h"
 PLACES = ("/usr/local/include", "/usr/local/include/onnxruntime", "/usr/include/onnxruntime")
 STEPS = 20

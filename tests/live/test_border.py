@@ -15,10 +15,11 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
+from iowbc.commands.options import HOST
 from iowbc.live import server as border
 from iowbc.live.drag import STIFFNESS
 from iowbc.live.page import SETTLED, Page
-from iowbc.live.server import HOST, serving
+from iowbc.live.server import serving
 
 PROTOCOL = Subprotocol(f"viser-v{viser.__version__}")
 HANDSHAKE = (

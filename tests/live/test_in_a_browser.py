@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from browser import BROWSER, PATIENCE, Browser, Tab
 
+from iowbc.commands.options import HOST
 from iowbc.live.page import Page
-from iowbc.live.server import HOST
 
 
 @pytest.mark.slow

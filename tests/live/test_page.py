@@ -10,6 +10,7 @@ import psutil
 import pytest
 from standing_still import StandingStill
 
+from iowbc.commands.options import HOST
 from iowbc.errors import UsageError
 from iowbc.evaluation.play import requested_episode
 from iowbc.evaluation.play_request import PlayRequest
@@ -18,7 +19,7 @@ from iowbc.evaluation.trials.rollout import play_in
 from iowbc.live.drawing import ShownParts
 from iowbc.live.page import SETTLED, Page
 from iowbc.live.panel import LIVE
-from iowbc.live.server import HOST, serving
+from iowbc.live.server import serving
 from iowbc.live.session import Session
 from iowbc.live.track import trial_titles
 from iowbc.recipe.evaluation.sequences import Segment
