@@ -67,9 +67,10 @@ class Planner:
         return self.whole and stage is self.stages[-1]
 
     def _want_whole(self, stage: Stage, known: "Plans") -> bool:
-        """Plans the borrowed artifacts anew that a stage would read and that are not whole; true if there are any.
+        """True if a stage that runs borrows artifacts that are not whole; from now on their recipes make them.
 
-        Raises `RecipeError` for one that the recipe names by its key."""
+        Raises `RecipeError` for one that the recipe names by its key.
+        """
         lacking = {name for name, one in self.borrowed(stage, known).items() if one is not None and not one.whole}
         for name in lacking:
             origin = self.origins.get((stage.name, name))
