@@ -83,7 +83,8 @@ def in_order(planner: Planner) -> list[Planner]:
     """Planners of all that runs for a recipe: first those from whose artifacts it begins, where they are not stored,
     then itself."""
     known: Plans = {}
-    planner.plan(known)
+    if planner.origins:
+        planner.plan(known)
     missing = [origin for origin in planner.origins.values() if not origin.plan(known)[-1].cached]
     return list(dict.fromkeys([*(each for origin in missing for each in in_order(origin)), planner]))
 
