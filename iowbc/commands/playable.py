@@ -1,4 +1,4 @@
-"""What a word names to be played: a policy with its world, or a skill with its controller."""
+"""Lookup of what `iowbc play` plays: a policy with its world, or a skill with its controller."""
 
 import contextlib
 import os
@@ -81,6 +81,8 @@ def playable_skill(store: Store, skill: Artifact, scene: str) -> PlayableSkill:
     if student is None:
         raise UsageError(f"{skill.folder}: this skill read no controller; run its recipe again")
     require_whole(store.runs, [skill, student, *([generator] if generator else [])])
+    for artifact in (skill, student):
+        require_results(store.runs, artifact)
     first = {getattr(recipe.skill.tasks, name).scene: name for name in reversed(recipe.skill.tasks.names)}
     require_known(scene, "scene with a transport task", first)
     world = world_of(skill.recipe, generator).deployed

@@ -49,8 +49,10 @@ class Planner:
             inputs = {
                 name: steps[name].artifact if steps[name].cached else None for name in stage.reads(self.loaded.recipe)
             }
-            step = self.decide(stage, {**inputs, **self.borrowed(stage, known)}, whole=self.read_whole(stage))
-            if not step.cached and self._want_whole(stage, known):
+            borrowed = self.borrowed(stage, known)
+            step = self.decide(stage, {**inputs, **borrowed}, whole=self.read_whole(stage))
+            if not step.cached and self._want_whole(stage, borrowed):
+                known.clear()
                 return self.plan(known)
             unknown = [name for name in inputs if not steps[name].cached and steps[name].expected is None]
             steps[stage.name] = replace(step, expected=None, roughly=step.guess) if unknown else step
@@ -66,18 +68,17 @@ class Planner:
         """True if only a whole artifact of a stage does."""
         return self.whole and stage is self.stages[-1]
 
-    def _want_whole(self, stage: Stage, known: "Plans") -> bool:
+    def _want_whole(self, stage: Stage, borrowed: Mapping[str, Artifact | None]) -> bool:
         """True if a stage that runs borrows artifacts that are not whole; from now on their recipes make them.
 
         Raises `RecipeError` for one that the recipe names by its key.
         """
-        lacking = {name for name, one in self.borrowed(stage, known).items() if one is not None and not one.whole}
+        lacking = [name for name, one in borrowed.items() if one is not None and not one.whole]
         for name in lacking:
             origin = self.origins.get((stage.name, name))
             if origin is None:
                 raise wrong_origin(self.loaded, stage.borrows(self.loaded.recipe)[name], NOT_WHOLE)
             origin.whole = True
-            known.clear()
         return bool(lacking)
 
     def borrowed(self, stage: Stage, known: "Plans | None" = None) -> dict[str, Artifact | None]:

@@ -104,7 +104,7 @@ def require_results(runs: Runs, artifact: Artifact) -> None:
 
 
 def _again(runs: Runs, artifact: Artifact, *options: str) -> str:
-    """The command that makes an artifact anew."""
+    """Command that makes an artifact again."""
     made, words = artifact.manifest, ["iowbc", "run", str(artifact.folder / RECIPE)]
     record = _record(runs, made.recipe)
     if record is not None and made.stage in record.stages and record.stages[made.stage].key == made.key:
