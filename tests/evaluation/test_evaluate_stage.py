@@ -165,7 +165,7 @@ def test_a_row_is_played_again_bit_for_bit(done: Job, recipe: Recipe, student: P
     (again,) = play_episodes(Specification(recipe, done.robot), [replayed(row)], policy, workers=0)
     assert again.seconds == row["seconds"]
     assert again.trace.base_position.shape[0] * again.trace.dt == pytest.approx(row["seconds"])
-    assert float(np.sum(again.trace.power) * again.trace.dt) == row["energy"]
+    assert np.float32(np.sum(again.trace.power) * again.trace.dt) == row["energy"]
 
 
 def test_neither_the_number_of_workers_nor_other_machines_change_anything(

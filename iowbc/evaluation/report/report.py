@@ -42,7 +42,7 @@ def write_report(
         pictures["push_map"] = map_figure(summary)
     for name, figure in pictures.items():
         write_figure(figure, folder / "figures" / f"{name}.png")
-    summary.to_csv(tables / "summary.csv", index=False)
+    summary.to_csv(tables / "summary.csv", index=False, float_format="%.9g")
     return summary
 
 

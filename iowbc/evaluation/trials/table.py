@@ -17,9 +17,13 @@ from iowbc.task.episodes import Episode
 
 
 def trial_row(recipe: Recipe, robot: Robot, trial: Trial, outcome: Outcome) -> dict[str, Any]:
-    """One row of the long table: trial, outcome, metrics, random draws, and the episode for a replay."""
+    """One row of the long table: trial, outcome, metrics, random draws, and the episode for a replay.
+
+    Metrics are rounded to single precision, which halves the file.
+    """
     episode, fixed = trial.episode, trial.episode.fixed
-    metrics = trial_metrics(recipe, robot, episode, outcome) | {"seconds": outcome.seconds}
+    measured = trial_metrics(recipe, robot, episode, outcome)
+    metrics = {name: float(np.float32(value)) for name, value in measured.items()} | {"seconds": outcome.seconds}
     alive = survived(recipe.eval.success, outcome)
     return {
         "variant": recipe.eval.label,
