@@ -115,6 +115,7 @@ def trials_of(
             "commanded_distance": 4.0,
             "partner_share": 0.5 if "partner" in suite else 0.0,
             "rolling_resistance": 0.06,
+            "drawn_rolling_resistance": 20.0 if suite.startswith("push") else 0.0,
             "height": "pelvis",
             "gait_period": 0.8,
             "peak_torque/hip": 20.0,

@@ -14,7 +14,7 @@ from iowbc.commands import completion, options
 from iowbc.commands.diff import difference_lines
 from iowbc.commands.lookup import COMPARED, FILM, film_of, members_of, named, points_of, start_comparison
 from iowbc.commands.printed import film_progress, print_json, shown_path, stdout_console, tell
-from iowbc.commands.results import PROBE, TRIALS, evaluated_actor, split_tables, tables_of
+from iowbc.commands.results import PROBE, TRIALS, evaluated_actor, split_tables
 from iowbc.errors import UsageError
 from iowbc.pipeline.console.live_table import sparkline
 from iowbc.pipeline.nested import flattened
@@ -144,7 +144,7 @@ def _joined(store: Store, found: Sequence[Run]) -> tuple[list[Table], dict[str, 
     file name."""
     evaluated = [run.artifacts["eval"] for run in found if "eval" in run.artifacts]
     if len(evaluated) < 2:
-        return [table for one in evaluated for table in tables_of(one)], {}
+        return [table for one in evaluated for table in read_tables(one.folder / "tables")], {}
     with tempfile.TemporaryDirectory() as folder:
         output, tried = Path(folder), _having(found, TRIALS)
         _report_probes(found, output)

@@ -100,7 +100,7 @@ def next_commands(runs: Runs, recipe: str, artifacts: Mapping[str, Artifact]) ->
 
 
 def _print_tables(artifact: Artifact, folder: Path, console: Console) -> None:
-    shown = {table.name: table for table in tables_of(artifact) if table.name in DRAWN}
+    shown = {table.name: table for table in read_tables(artifact.folder / "tables") if table.name in DRAWN}
     for name in sorted(shown, key=DRAWN.index):
         console.print()
         console.print(drawn(shown[name], console.width))
@@ -119,21 +119,6 @@ def split_tables(tables: Sequence[Table]) -> tuple[list[Table], list[Table]]:
 
 def _rank(name: str) -> tuple[int, str]:
     return TABLES.index(name) if name in TABLES else len(TABLES), name
-
-
-def tables_of(artifact: Artifact) -> list[Table]:
-    """The tables of an artifact; those of an evaluation that has them only as text are recomputed from its trials."""
-    found, file = read_tables(artifact.folder / "tables"), artifact.folder / TRIALS
-    if found or not file.is_file():
-        return found
-    import pandas as pd
-
-    from iowbc.evaluation.report.aggregate import aggregate
-    from iowbc.evaluation.report.report import report_tables
-
-    trials = pd.read_parquet(file)
-    rate = float(artifact.recipe["eval"]["success"]["capacity_rate"])
-    return sorted(report_tables(trials, aggregate(trials), rate), key=lambda table: table.name)
 
 
 def evaluated_actor(store: Store, artifact: Artifact, trials: "pd.DataFrame | None" = None) -> "Actor":

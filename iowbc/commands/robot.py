@@ -96,7 +96,8 @@ def robot(
         for port in (source, poses):
             if isinstance(port, Udp):
                 stack.callback(port.close)
-        source.wanted(0.0, None)  # discard commands from before the robot was ready
+                port.discard()
+        source.wanted(0.0, None)  # discard keys from before the robot was ready
         pace = "in step with the simulated robot" if lockstep else enable_realtime()
         tell(console, f"{pace}; zero torque; commands from {commands}; Ctrl+C damps and ends")
         clock: Clock = LockStep() if lockstep else MonotonicClock()
@@ -115,7 +116,7 @@ def robot(
 
 def _stop_request() -> threading.Event:
     stop = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP):
         signal.signal(number, lambda *_: stop.set())
     return stop
 

@@ -90,7 +90,7 @@ class Skill:
         n, references = controller.robots, ReferenceLayer(controller.robot, controller.contract.references, None)
         self.contract, self._session, self._controller = contract, session, controller
         self._every = round(controller.frequency / contract.frequency)
-        self._references, self._hands = references, HandForces(controller.robot, references, n)
+        self._references = references
         self._grasp = np.tile(both_wrists(base_grasp(controller.contract.references.grasps, scene)), (n, 1, 1))
         self._largest_step = rate_limits(contract.commands.rates) / controller.frequency
         self._pushing: Mask = np.full(n, pushing)
@@ -123,6 +123,7 @@ class Skill:
     def reset(self) -> None:
         """Reset all robots."""
         n = self._controller.robots
+        self._hands = HandForces(self._controller.robot, self._references, n)
         self._felt = np.zeros((n, self.contract.robot.history, 2, 3))
         self._wrist_error = np.zeros((n, 2, 3))
         self._passed = 0

@@ -67,23 +67,10 @@ def restore_optimizer(optimizer: torch.optim.Optimizer, arrays: Mapping[str, NDA
 
 
 def random_arrays() -> Arrays:
-    """The states of torch's and NumPy's global generators, which stable-baselines3 draws from."""
-    numpy_state = np.random.get_state(legacy=False)  # noqa: NPY002 - SB3 draws from the global generator
-    assert isinstance(numpy_state, dict)
-    gauss = [numpy_state["has_gauss"], numpy_state["gauss"]]
-    return {
-        "torch": torch.get_rng_state().numpy(),
-        "numpy": numpy_state["state"]["key"],
-        "numpy_position": np.array([numpy_state["state"]["pos"]]),
-        "numpy_gauss": np.array(gauss, np.float64),
-    }
+    """State of torch's global generator, from which the learners draw."""
+    return {"torch": torch.get_rng_state().numpy()}
 
 
 def restore_random(arrays: Mapping[str, NDArray[Any]]) -> None:
     """Inverse of `random_arrays`."""
     torch.set_rng_state(torch.from_numpy(np.array(arrays["torch"])))
-    has_gauss, gauss = arrays["numpy_gauss"]
-    state = {"key": arrays["numpy"], "pos": int(arrays["numpy_position"][0])}
-    np.random.set_state(  # noqa: NPY002 - SB3 draws from the global generator
-        {"bit_generator": "MT19937", "state": state, "has_gauss": int(has_gauss), "gauss": float(gauss)}
-    )

@@ -15,7 +15,7 @@ from iowbc.learning.networks import StudentNetwork, perceptron, swap
 from iowbc.recipe.distillation import Distillation
 from iowbc.robot.mirror import MirrorMap
 
-Symmetry = Literal["construction", "augment", "none"]
+Symmetry = Literal["construction", "none"]
 
 
 def spread(environments: int) -> NDArray[np.float64]:
@@ -77,20 +77,6 @@ class ReplayBuffer:
         self.targets[:] = arrays["targets"]
         self.ages[:] = arrays["ages"]
         self.added = int(arrays["added"][0])
-
-
-def mirror_half(
-    histories: NDArray[np.float32],
-    targets: NDArray[np.float32],
-    observation_mirror: MirrorMap,
-    action_mirror: MirrorMap,
-    random: np.random.Generator,
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Replace a random half of the samples by their left-right mirror image."""
-    chosen = random.random(len(targets)) < 0.5
-    histories[chosen] = observation_mirror(histories[chosen])
-    targets[chosen] = action_mirror(targets[chosen])
-    return histories, targets
 
 
 class DistillationLoss(nn.Module):

@@ -27,7 +27,6 @@ from iowbc.learning.networks import Mirrors, mirrors_as_json
 from iowbc.learning.normalization import Normalization
 from iowbc.learning.policy import ActorCritic
 from iowbc.learning.rollout import Samples
-from iowbc.learning.symmetry import half_mirrored, mirror_images
 from iowbc.recipe.skill.skill import SkillLearning
 from iowbc.recipe.teacher import Teacher
 from iowbc.rollouts.blocks import block_size
@@ -190,12 +189,9 @@ class Learner:
             group["lr"] = own
         before = self.policy.log_std.detach().clone()
         samples = self.samples.flat
-        augment = settings.symmetry == "augment"
-        images = mirror_images(self.samples, self.policy, self.mirrors, settings.mirror_gap) if augment else samples
         found: list[Tensor] = []
         for _ in range(settings.epochs):
-            rows = half_mirrored(samples, images) if augment else samples
-            shuffled = torch.index_select(rows, 0, torch.randperm(len(rows)).to(self.device))
+            shuffled = torch.index_select(samples, 0, torch.randperm(len(samples)).to(self.device))
             found += [self._gradient_step(batch, before) for batch in torch.split(shuffled, self._batch)]
         every = torch.stack(found).view(settings.epochs, -1, len(FIGURES))
         means = dict(zip(FIGURES, every.mean((0, 1)).tolist(), strict=True))

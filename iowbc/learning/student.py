@@ -12,12 +12,12 @@ from torch import Tensor
 
 from iowbc.learning import checkpoint
 from iowbc.learning.as_numpy import numpy_policy, student_policy
-from iowbc.learning.distillation import DistillationLoss, ReplayBuffer, Symmetry, mirror_half, spread
+from iowbc.learning.distillation import DistillationLoss, ReplayBuffer, Symmetry, spread
 from iowbc.learning.environments import Environments
 from iowbc.learning.networks import StudentNetwork, TeacherNetwork, mirror_as_json, mirrors_as_json
 from iowbc.learning.storage import Network
 from iowbc.recipe.distillation import Distillation
-from iowbc.robot.mirror import MirrorMap, side_by_side
+from iowbc.robot.mirror import MirrorMap
 from iowbc.rollouts.blocks import block_size
 from iowbc.rollouts.policies import History
 from iowbc.rollouts.rollout_policies import DaggerPolicy, Past
@@ -161,9 +161,6 @@ class StudentTraining:
     def _gradient_step(self) -> dict[str, float]:
         """One optimiser step with clipped gradient; returns the statistics of the loss before it."""
         histories, answers = self.experience.sample(self.settings.batch, self.random)
-        if self.symmetry == "augment":
-            answer_mirror = side_by_side((self.rows.action_mirror, self.rows.facts_mirror)).as_float32()
-            mirror_half(histories, answers, self.rows.observation_mirror, answer_mirror, self.random)
         loss: Tensor
         figures: dict[str, float]
         loss, figures = self.loss(torch.from_numpy(histories), torch.from_numpy(answers))

@@ -22,6 +22,9 @@ class SafetyLimits(Section):
     state_age: float = Field(default=0.015, gt=0.0)
     """Age of the newest state at which it is stale [s]: seven lost messages at 500 Hz; with the loop's period, damping
     begins within 20 ms of the last state."""
+    frozen: float = Field(default=0.05, gt=0.0)
+    """Time for which the inertial unit, or all motors, may repeat their values [s]: sensors have noise, and 25 states
+    allow for a board that updates them more slowly."""
     command_age: float = Field(default=0.5, gt=0.0)
     """Age of the newest command at which it is stale [s]; the robot covers 0.3 m in it at full speed."""
     object_age: float = Field(default=0.1, gt=0.0)
@@ -159,6 +162,9 @@ def stale(sensors: Sensors, now: float, limits: SafetyLimits) -> str | None:
         return f"stale state: nothing new for {1e3 * age:.0f} ms"
     if sensors.late > limits.state_age:
         return f"stale state: it arrives {1e3 * sensors.late:.0f} ms late"
+    for part, changed in sensors.changed.items():
+        if now - changed > limits.frozen:
+            return f"frozen {part}: equal values for {1e3 * (now - changed):.0f} ms"
     return None
 
 

@@ -137,7 +137,7 @@ class Machine:
             return f"second publisher: {given.others} low-level commands of another program"
         if (gap := given.now - self._last) > limits.overrun:
             return f"loop overrun: {1e3 * gap:.1f} ms since the last turn"
-        if self.state is State.RUN and (reason := self._stale_input(given)) is not None:
+        if (reason := self._stale_input(given, pose=self.state is State.RUN)) is not None:
             return reason
         return self._motion_fault(given.now)
 
@@ -178,14 +178,17 @@ class Machine:
             error = np.abs(now.position - self._goal)
             if error[worst := int(np.argmax(error))] > limits.standing_error:
                 return f"{self._contract.joints[worst]} is {error[worst]:.2f} rad from the standing posture"
-            return self._stale_input(given)
+            return self._stale_input(given, pose=True)
         return None
 
-    def _stale_input(self, given: CycleInputs) -> str | None:
-        """Reason if the newest command, or an object pose that the policy observes, is stale or missing."""
+    def _stale_input(self, given: CycleInputs, *, pose: bool) -> str | None:
+        """Reason if the newest command is stale, or with `pose` an object pose that the policy observes is stale or
+        missing."""
         wanted, limits = given.wanted, self.limits
         if (age := given.now - wanted.at) > limits.command_age:
             return f"stale command: nothing new for {age:.2f} s"
+        if not pose:
+            return None
         if missing := self._observed - wanted.seen.keys():
             return f"no object pose: {', '.join(sorted(missing))}; this policy observes the object"
         if self._observed and (age := given.now - wanted.seen_at) > limits.object_age:

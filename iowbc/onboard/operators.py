@@ -36,6 +36,10 @@ STEPS = {"i": (0, 0.1), "k": (0, -0.1), "j": (1, 0.05), "l": (1, -0.05), "u": (Y
 STEPS |= {"r": (HEIGHT, 0.02), "f": (HEIGHT, -0.02), "t": (PITCH, 0.1), "g": (PITCH, -0.1)}
 """Index of a command entry and step of each key [m/s, rad/s, m, rad]."""
 LARGEST_DATAGRAM = 8192
+MOST_DATAGRAMS = 8
+"""Datagrams read in a cycle of the control loop: 4,000 a second. A sender that is faster must not delay the loop."""
+BACKLOG = 10_000
+"""Datagrams that are discarded before the robot moves; the system's buffer holds fewer."""
 UNATTENDED = 5.0
 """Longest time without a key for which the keyboard's velocity is kept [s]: a connection that froze sends none."""
 ESCAPE = "\x1b"
@@ -105,8 +109,8 @@ class Remote:
 
 class Keyboard:
     """Keys of this terminal: 1 damping, 2 stand, 3 run, 0 zero torque, space damping; i k j l u o velocity, r f height,
-    t g torso pitch, x stops. Escape damps, and so does a terminal that is gone. Without a key for `UNATTENDED` the
-    velocity returns to zero."""
+    t g torso pitch, x stops. Escape damps, and so does a terminal that is gone. The velocity returns to zero on every
+    request but run, and without a key for `UNATTENDED`."""
 
     def __init__(self, ranges: Ranges) -> None:
         self._ranges, self._command, self._pressed = ranges, ranges.standing.copy(), 0.0
@@ -125,7 +129,7 @@ class Keyboard:
         if keys is None or self._sequence == ESCAPE:
             request = State.DAMPING
         self._pressed = now if keys else self._pressed
-        if now - self._pressed > UNATTENDED:
+        if now - self._pressed > UNATTENDED or request not in (None, State.RUN):
             self._command[:HEIGHT] = 0.0
         self._command = self._ranges.clipped(self._command)
         return OperatorRequest(self._command.copy(), now, request)
@@ -202,7 +206,7 @@ class Udp:
     def wanted(self, now: float, state: Record | None) -> OperatorRequest:
         request = None
         with contextlib.suppress(BlockingIOError):
-            while True:
+            for _ in range(MOST_DATAGRAMS):
                 data = self._socket.recv(LARGEST_DATAGRAM)
                 with contextlib.suppress(ValueError, RecursionError):
                     given = Datagram.model_validate(json.loads(data))
@@ -210,6 +214,12 @@ class Udp:
                     self._wanted = self._given(given, now)
         last = self._wanted
         return replace(last, request=request)
+
+    def discard(self) -> None:
+        """Drop the datagrams that have arrived."""
+        with contextlib.suppress(BlockingIOError):
+            for _ in range(BACKLOG):
+                self._socket.recv(LARGEST_DATAGRAM)
 
     def close(self) -> None:
         self._socket.close()

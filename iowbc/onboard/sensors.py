@@ -69,6 +69,8 @@ class Sensors:
         """Last heading within ±π that was finite [rad]."""
         self.at = -np.inf
         """Arrival time of the newest state [s]."""
+        self.changed = dict.fromkeys(("imu_state", "motor_state"), -np.inf)
+        """Time of the last state in which each part has other values than in the one before [s]."""
         self.late = 0.0
         """Its delay beyond the smallest one so far, by the robot's clock [s]."""
         self._least, self._least_at = np.inf, 0.0
@@ -80,6 +82,9 @@ class Sensors:
                 continue
             if self.state is not None and state["tick"] < self.state["tick"]:
                 self._least = np.inf
+            for part in self.changed:
+                if self.state is None or (self.state[part] != state[part]).any():
+                    self.changed[part] = now
             found = posture(state, self._joints)
             if np.isfinite(found.yaw):
                 last, self._yaw = self._yaw, found.yaw

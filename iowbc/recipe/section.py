@@ -74,6 +74,8 @@ class Section(BaseModel):
     withdrawn: ClassVar[Mapping[str, Any]] = {}
     """Fields of an earlier version that entered no key, with the value whose behaviour remains; resolved recipes of
     artifacts still give that value."""
+    withdrawn_from_key: ClassVar[Mapping[str, Any]] = {}
+    """The same for fields that entered the key, which still contains the value."""
 
     @property
     def idle(self) -> bool:
@@ -88,12 +90,13 @@ class Section(BaseModel):
     @classmethod
     def _without_withdrawn(cls, given: Any) -> Any:
         """The values without withdrawn fields. Raises ValueError for one with another value."""
-        if not isinstance(given, Mapping) or not cls.withdrawn.keys() & given.keys():
+        withdrawn = {**cls.withdrawn, **cls.withdrawn_from_key}
+        if not isinstance(given, Mapping) or not withdrawn.keys() & given.keys():
             return given
-        for name, value in cls.withdrawn.items():
+        for name, value in withdrawn.items():
             if given.get(name, value) != value:
                 raise ValueError(f"{name} was withdrawn; its behaviour is that of {shown(value)}: remove it")
-        return {name: value for name, value in given.items() if name not in cls.withdrawn}
+        return {name: value for name, value in given.items() if name not in withdrawn}
 
     @model_validator(mode="after")
     def _check_consistency(self) -> Self:
@@ -200,11 +203,11 @@ def deciding(section: Section) -> dict[str, Any]:
 
 
 def _deciding(value: Any, plain: Any) -> Any:
-    if isinstance(value, BaseModel):
+    if isinstance(value, Section):
         fields = type(value).model_fields.items()
         kept = [name for name, field in fields if not _left_out(field, getattr(value, name))]
         kept += value.model_extra or ()
-        return {name: _deciding(getattr(value, name), plain[name]) for name in kept}
+        return {name: _deciding(getattr(value, name), plain[name]) for name in kept} | {**value.withdrawn_from_key}
     if isinstance(value, Mapping):
         return {name: _deciding(item, plain[name]) for name, item in _acting(value).items()}
     if isinstance(value, Sequence) and not isinstance(value, str):

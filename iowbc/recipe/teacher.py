@@ -104,6 +104,7 @@ class Teacher(PPO):
     """PPO with privileged information."""
 
     withdrawn: ClassVar[Mapping[str, Any]] = {"smoothness": 0.0}
+    withdrawn_from_key: ClassVar[Mapping[str, Any]] = {"mirror_gap": 3.0}
 
     steps: int = Field(default=30_000_000, ge=1, le=10**12)
     """Environment steps of the training, summed over the environments. No schedule depends on them: a recipe that only
@@ -142,13 +143,9 @@ class Teacher(PPO):
     """Half-life of an exponential moving average of the policy's weights [environment steps]. The average is then the
     policy that is checked and saved, since the newest policy also fits the noise of the last rollouts. Empty: no
     average."""
-    symmetry: Literal["construction", "augment", "none"] = "construction"
+    symmetry: Literal["construction", "none"] = "construction"
     """Use of the left-right symmetry of robot and task. `construction`: exactly equivariant networks, with half the
-    multiplications. `augment`: dense networks that are also trained on mirrored samples. `none`: early learning takes
-    twice the steps."""
-    mirror_gap: float = Field(default=3.0, gt=0)
-    """With `augment`: a mirrored sample is dropped if its log-probability is below the original's by more than this
-    [nat], because its probability ratio explodes."""
+    multiplications. `none`: dense networks; early learning takes twice the steps."""
     normalization_clip: float = Field(default=10.0, gt=0)
     """Bound to which normalized observations are clipped [standard deviations]."""
     statistics_until: int = Field(default=10_000_000, ge=1, le=10**12)
@@ -191,8 +188,6 @@ class Teacher(PPO):
             yield "", f"std_floor, std_end and initial_std must ascend, got {stds}"
         if self.restart is not None and self.restart.std < self.std_end:
             yield "", f"restart.std {self.restart.std:g} is below std_end {self.std_end:g}: nothing comes back"
-        if self.history is not None and self.symmetry == "augment":
-            yield "", "symmetry: with `history` it is `construction` or `none`, not `augment`"
         if self.start is not None and self.history is not None and self.history.student is not None:
             yield "", "history.student: `start` names a policy to begin from, too; give one of them"
         latent = () if self.history is None else (self.history.latent,)

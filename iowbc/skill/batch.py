@@ -125,15 +125,14 @@ class GameBatch:
         memory, guidance = lower.memory, lower.guidance
         target = guidance.references.wrist_target(memory.posture, memory.command, guidance.grasp)
         self._wrist_error = wrists - target
-        touched = self._in_wall()
         end = ending(
             self._skill,
             self.now,
             held=held,
             happened=(lower.fallen, lower.dropped, lower.diverged),
-            touched=touched,
             late=self._decisions >= self._limit[self.drawn.task],
         )
+        touched = self._in_wall()
         before, self._potential = self._potential, potential(self._skill, self.now, held)
         buffers["reward"][:] = reward(
             self._skill, self._potential - before, end, self._costs * lower.period, self._jerk, touched

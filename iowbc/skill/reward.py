@@ -16,8 +16,6 @@ class GameEnding:
     success: Mask
     fallen: Mask
     dropped: Mask
-    touched: Mask
-    """A corner of the object in a wall, if the recipe ends the game there."""
     strayed: Mask
     diverged: Mask
     time_out: Mask
@@ -25,7 +23,7 @@ class GameEnding:
     @property
     def failed(self) -> Mask:
         """Ended with a penalty; divergence of the simulation has none."""
-        return self.fallen | self.dropped | self.touched | self.strayed
+        return self.fallen | self.dropped | self.strayed
 
     @property
     def terminated(self) -> Mask:
@@ -33,22 +31,19 @@ class GameEnding:
         return self.success | self.failed | self.diverged
 
 
-def ending(
-    skill: Skill, now: GameState, *, held: Mask, happened: tuple[Mask, Mask, Mask], touched: Mask, late: Mask
-) -> GameEnding:
-    """Endings of games, (n,) each. `held`: object in the hands; `happened`: falls, drops and divergence; `touched`:
-    walls; `late`: past the time limit."""
+def ending(skill: Skill, now: GameState, *, held: Mask, happened: tuple[Mask, Mask, Mask], late: Mask) -> GameEnding:
+    """Endings of games, (n,) each. `held`: object in the hands; `happened`: falls, drops and divergence; `late`: past
+    the time limit."""
     finish = skill.finish
     fallen, dropped, diverged = happened
     reached = (now.left < finish.distance) & (np.abs(now.lateral) < finish.lateral)
     reached &= (np.abs(now.yaw_error) < finish.yaw) & (~held | (np.abs(now.height_error) < finish.height))
     sound = ~(fallen | dropped | diverged)
-    walls = touched & sound & (finish.walls == "end")
-    strayed = (np.abs(now.lateral) > finish.stray) & sound & ~walls
-    success = reached & sound & ~walls & ~strayed
-    over = ~sound | walls | strayed | success
+    strayed = (np.abs(now.lateral) > finish.stray) & sound
+    success = reached & sound & ~strayed
+    over = ~sound | strayed | success
     fell, lost = fallen & ~diverged, dropped & ~(fallen | diverged)
-    return GameEnding(success, fell, lost, walls, strayed, diverged, late & ~over)
+    return GameEnding(success, fell, lost, strayed, diverged, late & ~over)
 
 
 def potential(skill: Skill, now: GameState, held: Mask) -> Array:

@@ -76,7 +76,7 @@ class SingleGame:
         outcome = self._game.outcome()
         self._seen = outcome.observed
         if outcome.terminated[0] or outcome.truncated[0]:
-            self.ending = next((name for name in COUNTED[:-1] if outcome.figures[name][0]), "touched")
+            self.ending = next(name for name in COUNTED[:-1] if outcome.figures[name][0])
 
     def lines(self) -> tuple[Line, ...]:
         """The path and its walls, on the ground."""

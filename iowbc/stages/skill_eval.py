@@ -34,6 +34,9 @@ def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
     for name in asked.tasks:
         if name not in tasks:
             yield "skill.eval.tasks", f"no task {name!r}; valid: {', '.join(tasks)}"
+    for rule in asked.rivals:
+        if RIVALS[rule] in (asked.label, *asked.others):
+            yield "skill.eval", f"the label {RIVALS[rule]!r} is that of the rule `{rule}`; choose another"
     scenes = dict.fromkeys(task.scene for name, task in tasks.items() if name in (asked.tasks or tasks))
     for scene in asked.masses:
         if scene not in scenes:

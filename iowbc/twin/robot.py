@@ -97,8 +97,8 @@ class Twin:
         kp, kd = (np.where(enabled, motors[name], 0.0).astype(np.float64) for name in ("kp", "kd"))
         if self._silent > SILENCE * FREQUENCY and kp.any():
             kp, kd = 0.0 * kp, self._kd
-        feed = np.where(enabled, motors["tau"] + kd * motors["dq"], 0.0)
-        self._drive(kp, kd, motors["q"] + feed / np.where(kp > 0.0, kp, np.inf))
+        tau, dq = (np.where(enabled, motors[name], 0.0).astype(np.float64) for name in ("tau", "dq"))
+        self._drive(kp, kd, motors["q"], dq, tau)
         self.periods += 1
         self._silent += 1
         self.support.advance(1.0 / FREQUENCY, bool((kp >= 0.99 * self.robot.kp).all()))
@@ -117,11 +117,13 @@ class Twin:
         place: Array = self._origin + self._frame.reshape(3, 3) @ HOOK
         return place
 
-    def _drive(self, kp: Array, kd: Array, target: Array) -> None:
-        """Sets gains, scaled by the sampled motor errors, and targets; a non-finite target keeps its last value."""
+    def _drive(self, kp: Array, kd: Array, target: Array, speed: Array, torque: Array) -> None:
+        """Sets gains, scaled by the sampled motor errors, targets and feed-forward torques; a non-finite target keeps
+        its last value, a non-finite torque is 0."""
         drawn, simulation = self.simulation.drawn, self.simulation
         kp, kd = kp * drawn["kp_scale"][0], kd * drawn["kd_scale"][0]
         self._gain[0, :, 0], self._bias[0, :, 1], self._bias[0, :, 2] = kp, -kp, -kd
+        self._bias[0, :, 0] = np.nan_to_num(torque + kd * speed, nan=0.0, posinf=0.0, neginf=0.0)
         simulation.target[0] = np.where(np.isfinite(target), target, simulation.target[0])
 
     @property

@@ -232,15 +232,9 @@ def test_the_output_may_be_cut_short(folder: Path) -> None:
     assert len(list((folder / "runs" / "store" / "export").iterdir())) == 2 + 1
 
 
-def test_an_artifact_and_its_tables_are_opened_from_python(folder: Path) -> None:
+def test_an_artifact_is_opened_from_python(folder: Path) -> None:
     artifact = open_artifact("second/teacher", folder / "runs")
     assert artifact.manifest.stage == "teacher"
-    (artifact.folder / "tables" / "rows.csv").write_text("a,b\n1,2\n")
-    assert artifact.table("rows").to_dict("list") == {"a": [1], "b": [2]}
-    (artifact.folder / "tables" / "rows.csv").write_text("variant,b\n1e3,2\n")
-    assert artifact.table("rows").to_dict("list") == {"variant": ["1e3"], "b": [2]}
-    with pytest.raises(KeyError, match="no table 'nothing'; it has: rows"):
-        artifact.table("nothing")
     with pytest.raises(UsageError, match="first/teacher"):
         open_artifact("first", folder / "runs")
 

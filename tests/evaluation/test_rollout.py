@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 
 from iowbc.errors import Interrupted
 from iowbc.evaluation.trials.rollout import RECORDED, play_in
-from iowbc.evaluation.trials.table import survived
-from iowbc.recipe.evaluation.evaluation import Success
 from iowbc.task.record.signals import SIGNALS, trial_signals
 
 WIDTHS = SIGNALS | trial_signals(29, 15)
@@ -77,15 +75,7 @@ def test_endings_are_told_apart() -> None:
     ways = ["fallen", "dropped", "time_limit", "diverged"]
     trials = played([2, 2, 2, 2], ways)
     assert [trial.ending for trial in trials] == ["fell", "dropped", "finished", "diverged"]
-    assert [survived(Success(), trial) for trial in trials] == [False, False, True, False]
-
-
-def test_a_slip_fails_a_trial_only_where_the_recipe_says_so() -> None:
-    environment: Any = CountingEnvironment([2], ["time_limit"])
-    environment.signals["slipped"][:] = 1
-    (trial,) = play_in(environment, Recorder())
-    assert survived(Success(), trial)
-    assert not survived(Success(slip_fails=True), trial)
+    assert [trial.survived for trial in trials] == [False, False, True, False]
 
 
 def test_what_was_drawn_is_kept_by_trial() -> None:

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import torch
 from exported_policies import graph_of
+from mirrored import mirror_tensor
 from test_graph import random_inputs
 
 from iowbc.control.action import action_mirror
@@ -13,7 +14,6 @@ from iowbc.deploy.controller import open_session, run
 from iowbc.export.golden import largest_difference
 from iowbc.export.onnx_graph import run_torch, write_onnx
 from iowbc.learning.networks import StudentNetwork, mirror_as_json
-from iowbc.learning.symmetry import mirror_tensor
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import Robot
 

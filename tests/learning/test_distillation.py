@@ -1,7 +1,6 @@
 import numpy as np
 
-from iowbc.learning.distillation import ReplayBuffer, mirror_half, spread
-from iowbc.robot.mirror import MirrorMap
+from iowbc.learning.distillation import ReplayBuffer, spread
 from iowbc.rollouts.policies import History
 
 
@@ -38,18 +37,6 @@ def test_the_ring_restores_exactly() -> None:
         first.sample(50, np.random.default_rng(2)), second.sample(50, np.random.default_rng(2)), strict=True
     ):
         np.testing.assert_array_equal(a, b)
-
-
-def test_half_of_the_samples_are_mirrored_with_their_targets() -> None:
-    histories = np.ones((1000, 2, 2), np.float32)
-    targets = np.ones((1000, 1), np.float32)
-    flip = MirrorMap(np.array([0, 1]), np.array([-1, 1], np.float32))
-    mirror_half(
-        histories, targets, flip, MirrorMap(np.array([0]), np.array([-1], np.float32)), np.random.default_rng(0)
-    )
-    assert 400 < (targets < 0).sum() < 600
-    np.testing.assert_array_equal(histories[:, :, 0], np.repeat(targets, 2, axis=1))
-    assert (histories[:, :, 1] == 1).all()
 
 
 def test_a_teacher_that_drives_some_drives_the_same_share_of_every_scene() -> None:

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
+from mirrored import mirror_tensor
 from point_masses import MIRRORS, PointMasses
 from point_masses import SETTINGS as POINT_MASSES
 
@@ -14,7 +15,6 @@ from iowbc.learning.as_numpy import student_policy
 from iowbc.learning.checkpoint import save_checkpoint
 from iowbc.learning.environments import HistoryEnvironments
 from iowbc.learning.networks import StudentNetwork
-from iowbc.learning.symmetry import mirror_tensor
 from iowbc.learning.teacher import TeacherTraining
 from iowbc.recipe.teacher import HistoryNetwork, Teacher
 from iowbc.robot.mirror import MirrorMap
@@ -120,8 +120,6 @@ def test_it_can_be_looked_at_while_it_trains(tmp_path: Path) -> None:
         np.testing.assert_array_equal(shown.act(frame, none), own.act(frame, none))
 
 
-def test_mirror_images_of_samples_and_an_odd_latent_are_refused() -> None:
-    with pytest.raises(ValueError, match="construction"):
-        Teacher(symmetry="augment", history=NETWORK)
+def test_an_odd_latent_is_refused() -> None:
     with pytest.raises(ValueError, match="7 is odd"):
         Teacher(history=HistoryNetwork(latent=7))

@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 import torch
 from gymnasium import spaces
+from mirrored import mirror_tensor
 
 from iowbc.learning.activations import ACTIVATIONS, PairedActivation
 from iowbc.learning.networks import SymmetricMlp, TeacherNetwork, mirror_as_json
 from iowbc.learning.normalization import SymmetricMeanStd
 from iowbc.learning.policy import ActorCritic
-from iowbc.learning.rollout import Samples
 from iowbc.learning.symmetric import MirrorBasis, SymmetricLayers
-from iowbc.learning.symmetry import half_mirrored, mirror_images, mirror_tensor
 from iowbc.robot.mirror import MirrorMap
 
 OBSERVATION = MirrorMap(np.array([1, 0, 2, 3, 5, 4]), np.array([1, 1, -1, 1, -1, -1], np.float32))
@@ -159,34 +158,3 @@ def test_symmetric_statistics_are_those_of_the_samples_and_their_images() -> Non
     both = np.concatenate([samples, OBSERVATION(samples)])
     np.testing.assert_allclose(statistics.mean, both.mean(0), atol=1e-5)
     np.testing.assert_allclose(statistics.var, both.var(0), rtol=1e-4)
-
-
-def test_samples_are_shown_or_their_whole_images_but_no_image_that_is_too_unlikely() -> None:
-    policy = randomized(
-        ActorCritic(
-            spaces.Box(-9, 9, (6,)),
-            spaces.Box(-9, 9, (3,)),
-            lambda _: 1e-3,
-            hidden=[8],
-            activation="elu",
-            clip=10.0,
-            initial_std=0.5,
-            std_learning_rate=1e-3,
-        )
-    )
-    rollout = Samples(2, 1, *policy.observation_space.shape, *policy.action_space.shape)
-    rollout.rows.normal_()
-    old = rollout.columns
-    image = mirror_tensor(ACTION, old["action"][0])
-    with torch.no_grad():
-        there = policy.get_distribution(mirror_tensor(OBSERVATION, old["observation"][0])).log_prob(image)
-    old["log_density"][0], old["log_density"][1] = there + 1.0, 1e3
-    images = mirror_images(rollout, policy, (OBSERVATION, ACTION), gap=3.0)
-    new = rollout.named(images)
-    torch.testing.assert_close(new["action"][:1], image)
-    torch.testing.assert_close(new["log_density"][:1], there.reshape(1), rtol=1e-4, atol=1e-4)
-    torch.testing.assert_close(new["advantage"][:1], old["advantage"][0])
-    torch.testing.assert_close(images[1], rollout.flat[1])
-    many = half_mirrored(torch.zeros(1000, 2), torch.ones(1000, 2))
-    assert 400 < int(many[:, 0].sum()) < 600
-    assert torch.equal(many[:, 0], many[:, 1])

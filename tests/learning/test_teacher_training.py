@@ -4,12 +4,12 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
+from mirrored import mirror_tensor
 from point_masses import MIRRORS, SETTINGS, PointMasses
 from stable_baselines3 import PPO
 
 from iowbc.learning import ppo
 from iowbc.learning.gaussian import log_density
-from iowbc.learning.symmetry import mirror_tensor
 from iowbc.learning.teacher import TeacherTraining
 from iowbc.recipe.teacher import Restart, Teacher
 
@@ -25,14 +25,13 @@ def finish(some: TeacherTraining) -> TeacherTraining:
 
 
 @pytest.mark.parametrize("average", [None, 16 * 8 * 2])
-@pytest.mark.parametrize("symmetry", ["construction", "augment", "none"])
+@pytest.mark.parametrize("symmetry", ["construction", "none"])
 def test_a_resumed_training_ends_bit_for_bit_where_an_unbroken_one_does(symmetry: str, average: int | None) -> None:
     unbroken = finish(training(symmetry=symmetry, average_half_life=average))
     broken = training(symmetry=symmetry, average_half_life=average)
     for _ in range(3):
         broken.update()
     kept = {name: value.copy() for name, value in broken.arrays().items()}
-    np.random.seed(99)  # noqa: NPY002 - SB3 draws from the global generator
     torch.manual_seed(99)
     resumed = training(symmetry=symmetry, average_half_life=average)
     resumed.restore(kept)
@@ -58,7 +57,7 @@ def test_what_the_value_alone_is_told_moves_no_action(symmetry: Any) -> None:
         assert float((policy.predict_values(told) - policy.predict_values(rows)).abs().max()) > 1e-3
 
 
-@pytest.mark.parametrize("symmetry", ["construction", "augment", "none"])
+@pytest.mark.parametrize("symmetry", ["construction", "none"])
 def test_the_mean_of_its_policies_is_what_a_training_leaves_and_changes_nothing_else(symmetry: Any) -> None:
     newest = training(symmetry=symmetry)
     expected = {name: value.numpy().copy() for name, value in newest.model.policy.state_dict().items()}
@@ -96,7 +95,7 @@ def test_what_a_check_of_the_mean_finds_best_is_kept_as_it_was() -> None:
     torch.testing.assert_close(some.network()[0](rows), best, rtol=0, atol=0)
 
 
-@pytest.mark.parametrize("symmetry", ["construction", "augment", "none"])
+@pytest.mark.parametrize("symmetry", ["construction", "none"])
 def test_what_begins_from_a_trained_policy_lets_its_value_learn_first(symmetry: Any) -> None:
     given, _ = finish(training(symmetry=symmetry)).network()
     rows = torch.randn(20, 3)
@@ -138,7 +137,7 @@ def test_what_the_value_alone_is_told_is_hidden_from_a_policy_that_knew_it() -> 
         assert float((given(told) - given(rows)).abs().max()) > 1e-3
 
 
-@pytest.mark.parametrize("symmetry", ["construction", "augment", "none"])
+@pytest.mark.parametrize("symmetry", ["construction", "none"])
 def test_training_learns_to_bring_masses_to_rest(symmetry: str) -> None:
     some = training(steps=16 * 8 * 60, symmetry=symmetry)
     first = some.update()["reward"]

@@ -87,15 +87,16 @@ def spoiling(change: Callable[[Record], None]) -> Channel:
     return through
 
 
-def freezing() -> Channel:
-    """Delivers the values of the first message with the times of those that follow."""
+def freezing(*parts: str) -> Channel:
+    """Delivers some parts of the first message with the rest of those that follow."""
     first: list[Record] = []
 
     def through(messages: list[Record], since: float) -> list[Record]:
         first.extend(messages[: 1 - len(first)])
-        frozen = [first[0].copy() for _ in messages]
-        for each, message in zip(frozen, messages, strict=True):
-            each["tick"] = message["tick"]
+        frozen = [each.copy() for each in messages]
+        for each in frozen:
+            for part in parts:
+                each[part] = first[0][part]
         return frozen
 
     return through
@@ -139,7 +140,9 @@ FAULTS = {
     "states 30 ms late": Fault("stale state", states=lambda: delaying(15)),
     "states sent twice": Fault(None, states=lambda: repeating),
     "states in wrong order": Fault(None, states=reordering),
-    "sensors frozen": Fault("stale state", states=freezing),
+    "sensors frozen": Fault("stale state", states=lambda: freezing("imu_state", "motor_state")),
+    "inertial unit frozen": Fault("frozen imu_state", within=0.06, states=lambda: freezing("imu_state")),
+    "motors frozen": Fault("frozen motor_state", within=0.06, states=lambda: freezing("motor_state")),
     "joint position NaN": Fault("a measurement is not finite", states=lambda: joint("q", np.nan)),
     "joint position beyond its limit": Fault("position limit", states=lambda: joint("q", 1.0)),
     "joint speed beyond its limit": Fault("velocity limit", states=lambda: joint("dq", 80.0)),

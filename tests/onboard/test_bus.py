@@ -119,10 +119,12 @@ class Rollout:
         return min(turn // 10, STEPS - 1)
 
     def state(self) -> Record:
-        """The state of the next turn; its time and a temperature make it new."""
+        """The state of the next turn; its time and its temperatures make it new."""
         self.turns += 1
         state = self.states[self._step(self.run + 1)].copy()
-        state["tick"], state["imu_state"]["temperature"] = 2 * self.turns, self.turns % 100
+        state["tick"] = 2 * self.turns
+        for part in ("imu_state", "motor_state"):
+            state[part]["temperature"] = self.turns % 70
         return state
 
     def wanted(self, now: float, state: Record | None) -> OperatorRequest:

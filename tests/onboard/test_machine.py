@@ -134,8 +134,11 @@ def test_states_that_repeat_damp_within_20_ms(still: Still) -> None:
         ({"charge": 9.0}, "battery at 9 %, less than 10"),
     ],
 )
-def test_what_else_goes_wrong_damps_a_running_robot(still: Still, other: dict[str, float], reason: str) -> None:
-    still.until(State.RUN)
+@pytest.mark.parametrize("state", [State.STAND, State.RUN])
+def test_what_else_goes_wrong_damps_a_robot_that_stands_or_runs(
+    still: Still, state: State, other: dict[str, float], reason: str
+) -> None:
+    still.until(state)
     still.turn(**other)
     assert still.machine.state is State.DAMPING
     assert reason in still.machine.events[0]

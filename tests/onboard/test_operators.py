@@ -116,6 +116,15 @@ def test_an_unattended_keyboard_stops_and_a_terminal_that_is_gone_damps(ranges: 
     assert keyboard.wanted(2.0, None).request is State.DAMPING
 
 
+@pytest.mark.parametrize("key", [b" ", b"0", b"1", b"2"])
+def test_a_request_that_ends_walking_ends_the_commanded_velocity(ranges: Ranges, terminal: int, key: bytes) -> None:
+    keyboard = Keyboard(ranges)
+    pressed(keyboard, terminal, b"iiu")
+    assert keyboard.wanted(0.1, None).command[:HEIGHT].any()
+    pressed(keyboard, terminal, key)
+    assert not keyboard.wanted(0.2, None).command[:HEIGHT].any()
+
+
 def test_a_measurement_of_another_size_is_ignored(sighted: Path) -> None:
     source = Udp(Ranges(read_contract(sighted)), 0)
     send(source, json.dumps({"seen": {"object_position": [0.3, 0.0], "object_quaternion": [1, 0, 0, 0]}}).encode())
@@ -150,6 +159,19 @@ def test_datagrams_are_clipped_to_training_and_keep_their_time(ranges: Ranges, s
 def test_a_datagram_that_cannot_be_read_changes_nothing(source: Udp, data: bytes) -> None:
     send(source, b'{"velocity": [0.2, 0.0]}', data)
     assert source.wanted(1.0, None).command[0] == 0.2
+
+
+def test_a_sender_without_a_pause_does_not_hold_up_the_loop(source: Udp) -> None:
+    send(source, *(json.dumps({"velocity": [0.001 * number, 0.0]}).encode() for number in range(20)))
+    found = [source.wanted(0.0, None).command[0] for _ in range(3)]
+    assert found == pytest.approx([0.007, 0.015, 0.019])
+
+
+def test_datagrams_from_before_the_robot_was_ready_are_dropped(source: Udp) -> None:
+    send(source, *[b'{"velocity": [0.2, 0.0], "request": "run"}'] * 20)
+    source.discard()
+    wanted = source.wanted(0.0, None)
+    assert (wanted.request, wanted.command[0], wanted.at) == (None, 0.0, -np.inf)
 
 
 def test_damping_wins_over_requests_that_follow_it(source: Udp) -> None:

@@ -72,6 +72,21 @@ def test_motors_brake_once_commands_stay_away(twin: Twin) -> None:
     assert (np.abs(twin.simulation.state.joint_torque[0]) <= limit).all()
 
 
+def test_a_motor_without_gains_has_the_torque_of_its_command(twin: Twin) -> None:
+    command = holding(twin)
+    motors = command["motor_cmd"][:29]
+    motors["kp"], motors["kd"], motors["tau"] = 0.0, 0.0, 2.0
+    motors["kd"][0], motors["dq"][0], motors["tau"][0] = 1.0, 2.0, 0.0
+    command["crc"] = messages.checksum(command)
+    twin.command(command)
+    twin.support = Support("band", 100.0)
+    velocity = twin.simulation.state.joint_velocity[0].copy()
+    twin.step()
+    torque = twin.simulation.state.joint_torque[0]
+    assert torque[1:] == pytest.approx(2.0, rel=0.2)
+    assert torque[0] == pytest.approx(2.0 - velocity[0], rel=0.3)
+
+
 def test_the_state_tells_what_the_sensors_deliver(twin: Twin) -> None:
     for _ in range(20):
         twin.step()

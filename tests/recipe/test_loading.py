@@ -130,8 +130,8 @@ def test_a_misspelt_key_names_place_value_valid_keys_and_the_nearest(tmp_path: P
 
 
 def test_a_key_in_the_wrong_section_names_the_right_one(tmp_path: Path) -> None:
-    (text,) = problems(tmp_path, "mirror_gap: 0.9\n")
-    assert text.endswith("did you mean 'teacher.mirror_gap'?")
+    (text,) = problems(tmp_path, "average_half_life: 9\n")
+    assert text.endswith("did you mean 'teacher.average_half_life'?")
 
 
 def test_all_problems_are_listed_with_their_lines(tmp_path: Path) -> None:

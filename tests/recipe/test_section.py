@@ -20,6 +20,7 @@ class Shorter(Inner):
     """The same, once longer."""
 
     withdrawn: ClassVar[Mapping[str, Any]] = {"gone": 8}
+    withdrawn_from_key: ClassVar[Mapping[str, Any]] = {"keyed": "once"}
 
 
 class Outer(Section):
@@ -38,7 +39,8 @@ def test_a_field_that_came_later_decides_nothing_until_it_departs_from_its_defau
 
 
 def test_a_withdrawn_field_may_keep_the_value_whose_behaviour_remains() -> None:
-    assert deciding(Shorter.model_validate({"old": 2, "gone": 8})) == {"old": 2}
+    assert deciding(Shorter.model_validate({"old": 2, "gone": 8})) == {"old": 2, "keyed": "once"}
+    assert deciding(Shorter.model_validate({"old": 2, "keyed": "once"})) == {"old": 2, "keyed": "once"}
     with pytest.raises(ValidationError, match="gone was withdrawn; its behaviour is that of 8: remove it"):
         Shorter.model_validate({"gone": 9})
     with pytest.raises(ValidationError, match="Extra inputs"):

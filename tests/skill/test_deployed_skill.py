@@ -107,6 +107,23 @@ def test_skill_and_controller_do_what_the_game_does(
                 assert targets.reasons == ("",)
 
 
+def test_a_reset_skill_remembers_nothing(folder: Path, recipe: Recipe, controller: Controller) -> None:
+    with closing(game_of(recipe, controller)) as game:
+        game.reset()
+        measured = copied(game.batch.lower.simulation.measured)
+    skill, commands = Skill.load(folder, controller), []
+    for before in (0, 9):  # 9: in the middle of a decision
+        for steps, moved in ((before, 0.1), (25, 0.0)):
+            controller.reset(scene="lift")
+            skill.reset()
+            for step in range(steps):
+                now = replace(measured, joint_position=measured.joint_position + moved + 1e-4 * step)
+                command = skill.step(now)
+                controller.step(now, command)
+        commands.append(command)
+    np.testing.assert_array_equal(*commands)
+
+
 def test_golden_vectors_are_those_of_the_graph(folder: Path, network: TeacherNetwork) -> None:
     with np.load(folder / GOLDEN, allow_pickle=False) as golden, torch.inference_mode():
         expected = network(torch.from_numpy(golden["input/observation"])).clamp(-1, 1).numpy()

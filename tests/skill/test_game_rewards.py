@@ -27,7 +27,6 @@ def judged(now: GameState, **happened: object) -> GameEnding:
         now,
         held=np.broadcast_to(happened.get("held", True), N),
         happened=(flags["fallen"], flags["dropped"], flags["diverged"]),
-        touched=np.broadcast_to(happened.get("touched", False), N),
         late=np.broadcast_to(happened.get("late", False), N),
     )
 

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
+from mirrored import mirror_tensor
 from own_parts import VELOCITY, own_part
 from stage_jobs import make_job
 from training_jobs import small_recipe
@@ -17,7 +18,6 @@ from iowbc.evaluation.trials.protocol import evaluated_world
 from iowbc.evaluation.trials.rollout import play_episodes
 from iowbc.learning.acting import load_policy
 from iowbc.learning.storage import load_teacher
-from iowbc.learning.symmetry import mirror_tensor
 from iowbc.pipeline.stage import START
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import Robot, robot_folder

@@ -15,6 +15,7 @@ import pandas as pd
 import pytest
 import torch
 from changes import changed
+from mirrored import mirror_tensor
 from safetensors.numpy import load_file
 from stable_baselines3 import PPO
 from stage_jobs import Backwards, make_job
@@ -25,7 +26,6 @@ from iowbc.errors import StageFailed
 from iowbc.evaluation.trials.plan import command_script
 from iowbc.learning.acting import StudentPolicy, load_policy, policy_of
 from iowbc.learning.storage import load_network, load_teacher
-from iowbc.learning.symmetry import mirror_tensor
 from iowbc.recipe.evaluation.sequences import LIFTING, PUSHING
 from iowbc.recipe.execution import Execution
 from iowbc.recipe.recipe import Recipe

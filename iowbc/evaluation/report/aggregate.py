@@ -75,7 +75,7 @@ def aggregate(trials: pd.DataFrame) -> pd.DataFrame:
 def _row(key: dict[str, object], group: pd.DataFrame, metrics: list[str]) -> dict[str, Any]:
     survivors = group[group["survived"]]
     succeeded, held = int(group["succeeded"].sum()), group["weight_in_hands"].notna()
-    pushed = group["object_beside"].notna() & ~held
+    pushed = group["object_beside"].notna() & (group["drawn_rolling_resistance"] > 0.0)
     design = design_effect(group["succeeded"].to_numpy(bool), group[WORLD].to_numpy())
     low, high = wilson_interval(succeeded, len(group), design)
     row: dict[str, Any] = {

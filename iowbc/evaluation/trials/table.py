@@ -24,7 +24,7 @@ def trial_row(recipe: Recipe, robot: Robot, trial: Trial, outcome: Outcome) -> d
     episode, fixed = trial.episode, trial.episode.fixed
     measured = trial_metrics(recipe, robot, episode, outcome)
     metrics = {name: float(np.float32(value)) for name, value in measured.items()} | {"seconds": outcome.seconds}
-    alive = survived(recipe.eval.success, outcome)
+    alive = outcome.survived
     return {
         "variant": recipe.eval.label,
         "policy": recipe.eval.policy,
@@ -56,12 +56,6 @@ def trial_row(recipe: Recipe, robot: Robot, trial: Trial, outcome: Outcome) -> d
         },
         "episode": json.dumps(episode.as_json()),
     }
-
-
-def survived(success: Success, outcome: Outcome) -> bool:
-    """True if a trial counts as survived; with `slip_fails`, only if no hand ever slipped."""
-    slipped = success.slip_fails and bool(np.any(outcome.trace.slipped > 0))
-    return outcome.survived and not slipped
 
 
 def succeeded(success: Success, kind: str, metrics: dict[str, float], *, blocked: bool = False) -> bool:

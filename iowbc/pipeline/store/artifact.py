@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
@@ -15,9 +15,6 @@ from iowbc.files import file_digest, synchronise, write_whole
 from iowbc.pipeline.stage import SUMMARY
 from iowbc.pipeline.store.digests import content_digest, data_digest
 from iowbc.pipeline.store.runs import read_json, read_yaml
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 MANIFEST = "manifest.json"
 INGREDIENTS = "key.json"
@@ -106,21 +103,6 @@ class Artifact:
         if not isinstance(metrics, dict):
             return {}
         return {str(name): float(value) for name, value in metrics.items() if isinstance(value, (int, float))}
-
-    def table(self, name: str) -> "pd.DataFrame":
-        """A table of the artifact as a pandas frame: `trials` for `trials.parquet`, `summary` for `tables/summary.csv`.
-
-        Raises `KeyError` with the names that there are.
-        """
-        import pandas as pd
-
-        paths = [*self.folder.rglob("*.parquet"), *(self.folder / "tables").glob("*.csv")]
-        found = {path.stem: path for path in sorted(paths)}
-        if name not in found:
-            raise KeyError(f"{self.folder} has no table '{name}'; it has: {', '.join(found) or 'none'}")
-        if found[name].suffix == ".parquet":
-            return pd.read_parquet(found[name])
-        return pd.read_csv(found[name], dtype={"variant": str, "reference": str})
 
     def verify(self) -> None:
         """Compare everything with its digest. Raises `Damaged`."""

@@ -1,7 +1,7 @@
 """Settings of the evaluation: suites of trials, their simulation, success criteria and videos."""
 
-from collections.abc import Iterator
-from typing import Literal
+from collections.abc import Iterator, Mapping
+from typing import Any, ClassVar, Literal
 
 from pydantic import Field
 
@@ -43,8 +43,8 @@ class Success(Section):
     force. An infeasible push instead requires survival, posture, feet that do not slide, and continued pushing. A
     robot that stands still never succeeds."""
 
-    slip_fails: bool = False
-    """Count a trial as failed if either hand ever lost the object, even if the other hand kept it."""
+    withdrawn_from_key: ClassVar[Mapping[str, Any]] = {"slip_fails": False}
+
     transport: float = Field(default=0.5, ge=0, le=1)
     """Fraction of the commanded displacement that robot and object must cover; a stationary robot covers none."""
     weight_in_hands: float = Field(default=0.95, ge=0, le=1)

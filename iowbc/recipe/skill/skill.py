@@ -1,7 +1,7 @@
 """The skill layer of a recipe: tasks, agents and reward of the Markov game."""
 
-from collections.abc import Iterator
-from typing import Literal
+from collections.abc import Iterator, Mapping
+from typing import Any, ClassVar, Literal
 
 from pydantic import Field
 
@@ -138,9 +138,9 @@ class GameReward(Section):
     success: float = Field(default=2.0, ge=0.0)
     """Reward of reaching the end: two thirds of a path's potential."""
     failure: float = Field(default=2.0, ge=0.0)
-    """Cost of a fall, a drop or a wall that ends the game."""
+    """Cost of a fall, a drop or an object that strays from the path."""
     touch: float = Field(default=0.5, ge=0.0)
-    """Cost per second of contact between the object and a wall that does not end the game [1/s]."""
+    """Cost per second of contact between the object and a wall [1/s]."""
     internal_force: float = Field(default=0.002, ge=0.0)
     """Cost of the horizontal internal force, in which both agents' forces cancel [1/(N·s)]: 20 N over 15 s cost as much
     as 0.6 m."""
@@ -226,6 +226,8 @@ class PathFollowing(Section):
 class Finish(Section):
     """Conditions that end a game."""
 
+    withdrawn_from_key: ClassVar[Mapping[str, Any]] = {"walls": "cost"}
+
     distance: float = Field(default=0.15, gt=0.0)
     """Distance along the path from its end that counts as reached [m]."""
     lateral: float = Field(default=0.2, gt=0.0)
@@ -234,8 +236,6 @@ class Finish(Section):
     """Largest deviation from the path's heading at the end [rad]."""
     height: float = Field(default=0.08, gt=0.0)
     """Largest distance from the path's height at the end [m], for an object that is carried."""
-    walls: Literal["end", "cost"] = "cost"
-    """Consequence of a collision of the object's corners with a wall: end of the game, or a cost over time."""
     stray: float = Field(default=1.0, gt=0.0)
     """Distance from the path at which the game ends [m]."""
 

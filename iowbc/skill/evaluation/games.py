@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
+from urllib.parse import quote
 
 import numpy as np
 import pandas as pd
@@ -75,7 +76,7 @@ def play_batches(
     for begin in range(0, len(planned), settings.games):
         batch = planned[begin : begin + settings.games]
         place = f"{competitor.label} {competitor.training} {begin} {len(batch)}"
-        path = work / f"{place.replace('/', '-').replace(' ', '_')}.parquet"
+        path = work / f"{quote(place, safe=' ')}.parquet"
         if not path.is_file():
             plans = [replace(plan, rule=competitor.rule) for plan in batch]
             with closing(TransportGame(*controller, n=len(plans), workers=workers, plans=plans)) as game:
