@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 CURVE_WIDTH = 40
 """Characters of a learning curve."""
 NOT_TRAINED = "not evaluated yet"
+LONGEST_NAME = 100
+"""Characters of the names in a report's file name."""
 
 
 def compare(
@@ -55,24 +57,30 @@ def compare(
     a folder of `runs/compare/`. film: also play one trial that all share again, and show the runs side by side. Raises
     `UsageError`.
     """
-    store, console = Store(Runs(runs)), stdout_console()
-    found = [named(store, word) for word in points_of(store, words)]
-    members = [name for word in words for name in members_of(word)]
-    if len(found) < 2 and not members:
+    store = Store(Runs(runs))
+    found = _recipes(store, words, "compare")
+    study = next((word for word in words if members_of(word)), "")
+    if len(found) < 2 and not study:
         raise UsageError("compare needs two or more recipes, for example `iowbc compare full wbc`")
-    output = output or (store.runs.compared / Path(words[0]).stem if members else store.runs.compared)
     options.require_extra("train", "iowbc compare")
+    write_comparison(store, found, output or store.runs.compared / Path(study).stem, study, film=film, as_json=as_json)
+
+
+def write_comparison(
+    store: Store, found: Sequence[Run], output: Path, study: str = "", *, film: bool = False, as_json: bool = False
+) -> None:
+    """Compare runs under `output`, and print the tables; see `compare`. study: the study whose variants they are."""
+    console, tried = stdout_console(), _having(found, TRIALS)
     require_writable(output, "--output")
-    tried = _having(found, TRIALS)
     if film and len(tried) < 2:
         raise UsageError("--film shows evaluated runs side by side: two or more must have finished the stage eval")
     require_whole(store.runs, (artifact for run in found for artifact in run.artifacts.values()))
     start_comparison([run.label for run in found], output)
     metrics = metrics_table(grouped(found))
     (output / "metrics.md").write_text(markdown(metrics), encoding="utf-8")
-    missing = [name for name in members if name not in {run.label for run in tried}]
+    missing = [name for name in members_of(study) if name not in {run.label for run in tried}]
     _report_probes(found, output)
-    if len(tried) > 1 or (tried and members):
+    if len(tried) > 1 or (tried and study):
         report_joint(tried, output, missing)
     if film:
         _film(store, console, tried, output / FILM, quiet=as_json)
@@ -85,7 +93,7 @@ def compare(
         console.print()
     _print_curves(curves, console)
     if missing:
-        text = f"not compared, for their eval has not run: {', '.join(missing)}; `iowbc plan {words[0]}` says how long "
+        text = f"not compared, for their eval has not run: {', '.join(missing)}; `iowbc plan {study}` says how long "
         tell(console, f"{text}that takes")
     for path in (path for path in sorted(output.iterdir()) if path.is_file()):
         tell(console, shown_path(path))
@@ -113,13 +121,10 @@ def report(
 
         report_log(console, words[0], log, output or log.with_suffix(".png"))
         return
-    output = output or store.runs.reports / f"{'-'.join(Path(word).stem for word in words)}.html"
-    found = [named(store, word) for word in points_of(store, words)]
-    single = [run.label for run in found if not run.recipe]
-    if single:
-        raise UsageError(
-            f"{single[0]} is one artifact; report takes recipes that have run, as `iowbc status` lists them"
-        )
+    name = "-".join(Path(word).stem for word in words)
+    name = name if len(name) <= LONGEST_NAME else f"{Path(words[0]).stem}-and-{len(words) - 1}-others"
+    output = output or store.runs.reports / f"{name}.html"
+    found = _recipes(store, words, "report")
     if output.suffix != ".html":
         raise UsageError(f"--output {output}: a report is an HTML file; give a name that ends in .html")
     options.require_extra("train", "iowbc report")
@@ -137,6 +142,16 @@ def report(
     main, others = split_tables(tables)
     write_page(output, found, grouped(found), main, others, differences, media)
     tell(console, f"{shown_path(output)} ({decimal(output.stat().st_size)}): open it in any browser, no network needed")
+
+
+def _recipes(store: Store, words: Sequence[str], command: str) -> list[Run]:
+    """The runs that the words name. Raises `UsageError` for an artifact."""
+    found = [named(store, word) for word in points_of(store, words)]
+    for run in found:
+        if not run.recipe:
+            text = f"{command} takes recipes that have run, as `iowbc status` lists them"
+            raise UsageError(f"{run.label} is one artifact; {text}")
+    return found
 
 
 def _joined(store: Store, found: Sequence[Run]) -> tuple[list[Table], dict[str, bytes]]:
@@ -281,13 +296,13 @@ def _steps_of(run: Run, stage: str) -> int | None:
     return int(flattened(made)[counted])
 
 
-def film_joint(store: Store, console: Console, words: Sequence[str], output: Path) -> Path | None:
+def film_joint(store: Store, console: Console, runs: Sequence[Run], output: Path) -> Path | None:
     """Film a trial that all evaluated runs share, unless there is such a film that is newer than they are.
 
     None where fewer than two were evaluated. Raises `UsageError` where they share no trial, NoRenderer where nothing
     can be drawn.
     """
-    tried, film = _having([named(store, word) for word in words], TRIALS), output / FILM
+    tried, film = _having(runs, TRIALS), output / FILM
     if len(tried) < 2:
         return None
     newest = max((run.artifacts["eval"].folder / TRIALS).stat().st_mtime for run in tried)

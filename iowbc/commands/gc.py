@@ -21,6 +21,7 @@ from iowbc.pipeline.store.runs import Runs, require_writable_runs
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.store.workspace import unfinished
 from iowbc.pipeline.tracking.journal import Journal, sent_path, unsent
+from iowbc.stages.registry import STAGES
 
 REMOVING = ".removing-"
 """Beginning of the name of a folder that is being removed."""
@@ -96,6 +97,9 @@ def _to_remove(
             if not restorable and not holder(runs, key) and not holder(runs, PUBLISHING):
                 yield path
     others = {key for name in known if name not in recipes for key in ever_used(runs, name)}
+    read = [one.ingredients.get("inputs", {}) for one in own if one.manifest.key in others]
+    borrowed = {digest for inputs in read for name, digest in inputs.items() if name not in STAGES}
+    others |= {one.manifest.key for one in own if one.manifest.digest in borrowed}
     for recipe in recipes:
         keys = ever_used(runs, recipe).keys() - others
         yield from (artifact.folder for artifact in free if artifact.manifest.key in keys)

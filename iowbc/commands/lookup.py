@@ -21,6 +21,7 @@ from iowbc.pipeline.store.workspace import unfinished
 from iowbc.recipe.reading.loading import SUFFIXES, load_recipe, recipe_file
 from iowbc.recipe.reading.study import load_study
 from iowbc.recipe.recipe import PIPELINE, Recipe
+from iowbc.recipe.section import deciding
 from iowbc.recipe.sweep import Sweep
 from iowbc.report.runs import Run
 from iowbc.stages.registry import STAGES
@@ -98,8 +99,20 @@ def _recipe(store: Store, word: str, name: str, published: Mapping[str, Mapping[
         own = [artifact for artifact in shipped.values() if artifact.manifest.recipe == name]
         return Run(word, shipped, own[-1].recipe)
     used = last_used(store, name)
+    recipe = Recipe.model_validate(record.recipe)
+    for stage, artifact in shipped.items():
+        if stage not in used and _continues(stage, artifact, recipe, used):
+            used[stage] = artifact
     others = {stage: artifact for stage, artifact in shipped.items() if stage not in used}
     return Run(word, used, record.recipe, others)
+
+
+def _continues(name: str, artifact: Artifact, recipe: Recipe, used: Mapping[str, Artifact]) -> bool:
+    """True for a published artifact of a stage that a recipe would use after the artifacts that it used last."""
+    stage, known = STAGES[name], artifact.ingredients
+    inputs = {source: used[source].manifest.digest for source in known.get("inputs", {}) if source in used}
+    same = known.get("inputs", {}).items() >= inputs.items() and known.get("version") == stage.version
+    return same and known.get("recipe") == stage.key_values(recipe, deciding(recipe))
 
 
 def _name_in(word: str) -> str:
@@ -112,11 +125,12 @@ def _name_in(word: str) -> str:
 def _published(store: Store) -> dict[str, dict[str, Artifact]]:
     """By recipe, and by stage: the artifacts that came with the repository, and those that they were made from, which
     another recipe may have made first."""
-    published = [one for stage in PIPELINE for one in store.artifacts(stage) if one.published]
+    published = [one for stage in PIPELINE for one in store.published(stage)]
+    newest = {one.manifest.key: store.find_any(one.manifest.stage, one.manifest.key) or one for one in published}
     found: dict[str, dict[str, Artifact]] = {}
     for artifact in published:
-        found.setdefault(artifact.manifest.recipe, {})[artifact.manifest.stage] = artifact
-    contents = {(artifact.manifest.stage, artifact.manifest.digest): artifact for artifact in published}
+        found.setdefault(artifact.manifest.recipe, {})[artifact.manifest.stage] = newest[artifact.manifest.key]
+    contents = {(one.manifest.stage, one.manifest.digest): newest[one.manifest.key] for one in published}
     for own in found.values():
         for stage in reversed(PIPELINE):
             read = own[stage].ingredients.get("inputs", {}) if stage in own else {}
@@ -162,7 +176,7 @@ def start_comparison(words: Sequence[str], folder: Path) -> None:
 
 
 def points_of(store: Store, words: Sequence[str]) -> list[str]:
-    """Names of recipes; the name of a sweep, study or comparison is replaced by its finished recipes."""
+    """Names of recipes, each once; the name of a sweep, study or comparison is replaced by its finished recipes."""
     recipes = finished_recipes(store)
     found: list[str] = []
     for word in words:
@@ -171,7 +185,7 @@ def points_of(store: Store, words: Sequence[str]) -> list[str]:
             swept = _recorded(store.runs.sweeps / word / SWEEP_RECORD, "points")
             names = swept or members_of(word) or _recorded(store.runs.compared / word / COMPARISON_RECORD, "runs")
         found += [name for name in names if name in recipes] or [word]
-    return found
+    return list(dict.fromkeys(found))
 
 
 def _recorded(file: Path, key: str) -> list[str]:
@@ -214,7 +228,7 @@ def in_training(store: Store, word: str, stage: str | None) -> UnfinishedTrainin
     name, wanted = (name, last) if slash and Path(word).suffix not in SUFFIXES else (word, stage)
     if wanted not in STAGES or not STAGES[wanted].trained_by:
         return None
-    own = [one for one in unfinished(store.runs) if (one[1].stage, one[1].recipe) == (wanted, Path(name).stem)]
+    own = [one for one in unfinished(store.runs) if (one[1].stage, one[1].recipe) == (wanted, _name_in(name))]
     if not own:
         return None
     folder, record = own[0]

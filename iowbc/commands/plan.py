@@ -198,6 +198,6 @@ def step_data(step: StagePlan) -> dict[str, Any]:
         "reasons": step.reasons,
         "notes": step.notes,
         "expected_seconds": None if step.cached else step.expected,
-        "expected_range": None if step.cached else [(step.expected or 0.0) * end for end in step.spread],
+        "expected_range": None if step.cached or not step.expected else [step.expected * end for end in step.spread],
         "roughly_seconds": None if step.cached else step.roughly,
     }

@@ -8,9 +8,9 @@ import signal
 import sys
 import tempfile
 import traceback
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING
@@ -19,6 +19,8 @@ from iowbc.full_disk import FULL, is_disk_full, what_is_full
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
+
+    from iowbc.pipeline.store.artifact import Artifact
 
 DONE, STAGE_FAILED, INTERRUPTED = 0, 1, 130
 """Exit codes."""
@@ -38,6 +40,8 @@ class RunEnding:
     code: int
     failure: str = ""
     """The stage that failed and the reason, in a line; empty where none did."""
+    artifacts: "Mapping[str, Artifact]" = field(default_factory=dict)
+    """By stage: what the run made or found, if it is done."""
 
     @property
     def state(self) -> str:

@@ -28,7 +28,8 @@ def publish(
     ] = None,
     runs: options.RunsFolder = options.RUNS,
 ) -> None:
-    """Copy a recipe's artifacts to `runs/published/`, except for the files in `without`, and verify the copies.
+    """Copy a recipe's artifacts, and those that it begins from, to `runs/published/`, except for the files in
+    `without`, and verify the copies.
 
     Raises `UsageError` if a stage has not run, or if no artifact has a file in `without`. Code changes since an
     artifact was made are reported but accepted.
@@ -42,9 +43,10 @@ def publish(
         raise UsageError(f"{', '.join(missing)}: not finished for this recipe; to finish: {request.command()}")
     require_writable_runs(request.runs)
     notes = {step.key: step.notes for step in steps}
-    made = [step.artifact for step in steps]
-    started = [one for planner in found for stage in planner.stages for one in planner.borrowed(stage).values()]
-    artifacts = {one.manifest.key: one for one in (*made, *started) if one is not None}
+    chains = [one for planner in found for one in planner.chain()]
+    made = [step.artifact for one in chains for step in one.plan()]
+    made += [one for each in chains for stage in each.stages for one in each.borrowed(stage).values()]
+    artifacts = {one.manifest.key: one for one in made if one is not None}
     names = {name for artifact in artifacts.values() for name in artifact.manifest.files}
     for name in without:
         if name not in names:

@@ -10,7 +10,7 @@ import typer
 from rich.console import Console
 
 from iowbc.commands import options
-from iowbc.commands.compare import compare, film_joint
+from iowbc.commands.compare import film_joint, write_comparison
 from iowbc.commands.plan import print_plan
 from iowbc.commands.printed import shown_path, stdout_console, tell
 from iowbc.commands.process import DONE, INTERRUPTED, STAGE_FAILED, RunEnding, ignoring_broken_outputs
@@ -28,6 +28,7 @@ from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.tracking.tracker import Tracker, backlog, record_figures
 from iowbc.recipe.execution import Execution
 from iowbc.recipe.reading.loading import LoadedRecipe
+from iowbc.report.runs import Run
 
 if TYPE_CHECKING:
     from iowbc.pipeline.cluster.cluster import Cluster
@@ -76,6 +77,7 @@ def run_request(request: Request, console: Console, manner: Manner) -> int:
         ):
             if cluster is not None and manner != "quiet":
                 console.print(cluster.text, highlight=False)
+            done: list[Run] = []
             for planner in ready:
                 order = in_order(planner)
                 for one in order:
@@ -84,31 +86,34 @@ def run_request(request: Request, console: Console, manner: Manner) -> int:
                     ending = run_recipe(one, request, console, stop, manner, cluster=cluster)
                     if ending.code != DONE:
                         return ending.code
+                recipe = planner.loaded.recipe
+                done.append(Run(recipe.name, ending.artifacts, recipe.model_dump(mode="json")))
     except KeyboardInterrupt:
         return INTERRUPTED
     if len(ready) > 1 and request.options.until is None and manner != "quiet":
-        compare_variants(request, [planner.loaded for planner in ready], console)
+        compare_variants(request, done, console, ready[0].loaded.recipe.execution.track)
     return DONE
 
 
-def compare_variants(request: Request, loaded: Sequence[LoadedRecipe], console: Console) -> None:
-    """Compare the variants of a study, film them side by side, and tell MLflow where that is new."""
-    name = Path(request.word).stem
-    words, output = [one.recipe.name for one in loaded], request.runs.compared / name
+def compare_variants(request: Request, variants: Sequence[Run], console: Console, track: bool) -> None:
+    """Compare the variants of a study, film them side by side, and tell MLflow with `track` where that is new."""
+    name, store = Path(request.word).stem, Store(request.runs)
+    output = request.runs.compared / name
     before = _report_of(output)
-    compare(words, output, runs=request.runs.root)
+    write_comparison(store, variants, output, request.word)
     try:
-        film = film_joint(Store(request.runs), console, words, output)
+        film = film_joint(store, console, variants, output)
     except UsageError as reason:
         film = None
         tell(console, f"no film: {reason}")
     if film is not None:
         tell(console, shown_path(film))
     report = _report_of(output)
-    if report != before and loaded[0].recipe.execution.track:
+    if report != before and track:
         files = [path for path in sorted(output.rglob("*")) if path.is_file()]
         record_figures(request.runs, f"compare-{name}", {}, report, files)
-    tell(console, f"next:\n  {shlex.join(['iowbc', 'report', name, *request.runs.option])}")
+    if not request.overrides:  # names stand for runs without them
+        tell(console, f"next:\n  {shlex.join(['iowbc', 'report', name, *request.runs.option])}")
 
 
 def _report_of(folder: Path) -> str:
@@ -160,7 +165,7 @@ def run_recipe(
             execute = run_here if cluster is None else cluster.run
             runner = Runner(planner, display, tracker, stop, rest, execute, workers)
             runner.run()
-            status, ending = "FINISHED", RunEnding(DONE)
+            status, ending = "FINISHED", RunEnding(DONE, artifacts=runner.artifacts)
             if tracker is not None:
                 tracker.describe(main_tables(artifact.folder for artifact in runner.artifacts.values()))
         except PipelineFailed as error:

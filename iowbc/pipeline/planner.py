@@ -64,6 +64,10 @@ class Planner:
         known[self] = list(steps.values())
         return known[self]
 
+    def chain(self) -> "list[Planner]":
+        """This planner and those of all recipes that it begins from, each once."""
+        return list(dict.fromkeys([self, *(one for origin in self.origins.values() for one in origin.chain())]))
+
     def read_whole(self, stage: Stage) -> bool:
         """True if only a whole artifact of a stage does."""
         return self.whole and stage is self.stages[-1]

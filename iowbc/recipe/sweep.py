@@ -130,7 +130,8 @@ def load_sweep(
 ) -> Sweep:
     """The points of a sweep, all of them valid recipes. Raises `RecipeError`.
 
-    settings: `path=value` holds for all points; `path=a,b` and `path=0..4` vary it, and override the file.
+    settings: `path=value` holds for all points; `path=a,b` and `path=0..4` vary it. They override the file, and of
+    several for one path the last counts.
     most: largest number of points.
     """
     described = SweepFile() if file is None else _read_file(file)
@@ -143,12 +144,14 @@ def load_sweep(
         place, (path, equals, text) = f"--set {setting}", setting.partition("=")
         listed = plain(read_value(f"[{text}]", place)) if equals else []  # so that brackets and quotes keep commas
         values = _expanded(listed if isinstance(listed, list) else [], place)
+        grid.pop(path.strip(), None)
         if len(values) > 1:
             grid[path.strip()] = values
         else:
             fixed.append(setting)
+    set_here = {*grid, *(setting.partition("=")[0].strip() for setting in fixed)}
     drawn = described.draws.points() if described.draws is not None else [{}]
-    drawn = [{path: value for path, value in point.items() if path not in grid} for point in drawn]
+    drawn = [{path: value for path, value in point.items() if path not in set_here} for point in drawn]
     axes = (*grid, *drawn[0])
     if axes or not load_study(word):
         _require_axes(axes, file)

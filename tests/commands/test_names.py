@@ -101,6 +101,26 @@ def test_a_run_that_has_begun_does_not_hide_what_is_published_until_it_has_its_o
     assert not playable(store, "first", None).published
 
 
+def test_what_is_published_and_would_be_used_next_belongs_to_a_run_that_ended_early(
+    folder: Path, command: Command
+) -> None:
+    assert command("publish", "first.yaml").returncode == 0
+    for name in ("store", "recipes", "first", "second"):
+        shutil.rmtree(folder / "runs" / name)
+    assert command("run", "first.yaml", "--until", "rg-fit").returncode == 0
+    assert "attempt" in command("show", "first/export").stdout
+    assert "export" in command("show", "first").stdout
+
+
+def test_a_local_copy_of_what_is_published_is_found_by_the_same_name(folder: Path, command: Command) -> None:
+    assert command("publish", "second.yaml").returncode == 0
+    for name in ("recipes", "first", "second"):
+        shutil.rmtree(folder / "runs" / name)
+    found = named(Store(Runs(folder / "runs")), "second").artifacts
+    assert {"rg-dataset", "rg-fit", "teacher", "distill", "export"} <= found.keys()
+    assert not any(artifact.published for artifact in found.values())
+
+
 def test_a_run_with_overrides_neither_takes_a_published_name_nor_is_mixed_with_others(
     folder: Path, command: Command
 ) -> None:

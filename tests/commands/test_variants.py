@@ -41,6 +41,9 @@ def test_each_variant_runs_once_and_they_are_compared(folder: Path, command: Com
     assert len(compared) == 2, "the made-up stages count alike, and what is alike is left out"
     assert command("run", "both.yaml").stdout.count(": cached") == 12
     assert "next:\n  iowbc report both" in done.stdout
+    changed = command("run", "both.yaml", "--set", "eval.trials=9")
+    assert changed.returncode == 0, changed.stderr
+    assert "iowbc report both" not in changed.stdout, "the names stand for the runs without overrides"
     store = Store(Runs(folder / "runs"))
     assert points_of(store, ["both"]) == ["first", "third"], "later commands know them by the recipe's name"
     assert points_of(store, ["first", "nobody"]) == ["first", "nobody"]

@@ -177,3 +177,12 @@ def test_a_recipe_that_several_begin_from_is_planned_once(tmp_path: Path, monkey
     planner_for(experts, STAGES, Store(Runs(tmp_path)), robot_folder("g1"), Options()).plan()
     assert len(decided) > 20
     assert set(decided.values()) == {1}
+
+
+def test_gc_keeps_what_another_recipe_begins_from(workplace: Workplace, second: str) -> None:
+    assert workplace.command("run", second).code == 0
+    assert workplace.command("run", "small.yaml").code == 0
+    removed = workplace.command("gc", "--recipe", "small").output
+    assert "removed runs/store/eval/" in removed
+    assert "runs/store/teacher" not in removed
+    assert workplace.command("plan", second).output.count("cached") == 6

@@ -79,6 +79,9 @@ def test_integers_have_both_ends_and_the_command_line_goes_before_the_file(recip
     sweep = load_sweep(recipe, ["seed=0..2"], file)
     assert [found["teacher.clip"] for found in settings(sweep)][::3] == [0.1, 0.2, 0.3]
     assert [found["seed"] for found in settings(sweep)][:3] == [0, 1, 2]
+    fixed = load_sweep(recipe, ["seed=7"], file)
+    assert fixed.axes == ("teacher.clip",)
+    assert {point.loaded.recipe.seed for point in fixed.points} == {7}
 
 
 def test_the_variants_of_a_recipe_of_recipes_are_an_axis(recipe: str, tmp_path: Path) -> None:

@@ -55,6 +55,14 @@ class Store:
                     found[artifact.manifest.key] = artifact
         return sorted(found.values(), key=lambda artifact: artifact.manifest.made)
 
+    def published(self, stage: str) -> list[Artifact]:
+        """The readable published artifacts of a stage, oldest first."""
+        found: list[Artifact] = []
+        for folder in self.runs.published.glob(f"{stage}/*"):
+            with suppress(Damaged):
+                found += filter(None, [self.find(stage, folder.name, published=True)])
+        return sorted(found, key=lambda artifact: artifact.manifest.made)
+
     def add(self, out: Path, stage: str, key: str) -> Artifact:
         """Move sealed output into the store, replacing an existing artifact."""
         folder = self.folder(stage, key)
