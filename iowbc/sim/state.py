@@ -73,7 +73,7 @@ class SimulationState:
     foot_velocity: Array
     """Velocity of the sole centres, (n, 2, 3) [m/s]."""
     foot_force: Array
-    """Contact force of the ground on each foot, (n, 2, 3) [N]."""
+    """Contact force on each foot, of the ground and of whatever else it touches, (n, 2, 3) [N]."""
     foot_contact: Mask
     """(n, 2)."""
     has_object: Mask

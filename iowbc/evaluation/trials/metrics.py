@@ -73,7 +73,8 @@ def effort_metrics(trace: Trace, robot: Robot) -> dict[str, float]:
     """Effort in the trial: torques, energy, forces at hands and partner, jerk of torso and object, and the root mean
     square of the action's second difference over time and support joints [rad].
 
-    `torque_rms/<joint>`: RMS torque of a joint as a fraction of its limit; `torque_rms`: the largest of these.
+    `torque_rms/<joint>`: RMS torque of a joint as a fraction of its nominal limit, which motor strength and linkage may
+    lower in the trial; `torque_rms`: the largest of these.
     """
     grips = np.linalg.norm(trace.grip_force.reshape(-1, 2, 3), axis=2)
     peak, saturated = np.abs(trace.joint_torque).max(axis=0), trace.joint_saturation.mean(axis=0)
