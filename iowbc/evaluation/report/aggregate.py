@@ -28,7 +28,7 @@ SETTINGS = (
 )
 """Columns with the same value in all trials of a row."""
 TORQUE = "torque_rms"
-"""RMS torque as a fraction of the nominal limit: of the worst joint and, with a slash and its name appended, of each joint."""
+"""RMS torque as a fraction of the nominal limit: of the worst joint and, with a slash and a name, of each joint."""
 TRAINING = "training_seed"
 """Column that identifies the training of a variant; if absent, there is only one."""
 WORLD = "trial"

@@ -39,8 +39,9 @@ def interaction_metrics(trace: Trace, window: int) -> dict[str, float]:
     `hand_force_mean`, `_p95`, `_peak`: horizontal force between object and a hand, of the hand with more [N], in
     compliant grasps without the pressure of the palms; NaN without an object. `handle_force_mean`, `_p95`, `_peak`: of
     the partner at the far handle [N]; `partner_work`: horizontal work done on the partner [J], with the handle's
-    velocity at the end of each step, which gives 2 to 12 J too little in a held lift; `E_v_partner`: mean planar deviation of the handle's velocity, averaged
-    over a gait period, from the one that the partner intends [m/s]; NaN without a partner.
+    velocity at the end of each step, which gives 2 to 12 J too little in a held lift; `E_v_partner`: mean planar
+    deviation of the handle's velocity, averaged over a gait period, from the one that the partner intends [m/s]; NaN
+    without a partner.
     """
     none = np.full(1, np.nan)
     at_hands = np.linalg.norm(hand_forces(trace), axis=-1) if np.any(trace.object_position) else none
