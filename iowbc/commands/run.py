@@ -20,7 +20,7 @@ from iowbc.errors import Interrupted, PipelineFailed, UsageError
 from iowbc.pipeline.console.display import Display, PlainDisplay
 from iowbc.pipeline.console.live_table import LiveTable
 from iowbc.pipeline.planner import Planner
-from iowbc.pipeline.runner import Runner, run_here
+from iowbc.pipeline.runner import Runner
 from iowbc.pipeline.stage_plan import Options
 from iowbc.pipeline.stop_request import StopRequest
 from iowbc.pipeline.store.runs import Runs, require_writable_runs
@@ -162,7 +162,7 @@ def run_recipe(
         try:
             tracker = Tracker(request.runs, loaded, within) if loaded.recipe.execution.track else None
             display = _display(loaded, console, lambda: stop.text, manner)
-            execute = run_here if cluster is None else cluster.run
+            execute = None if cluster is None else cluster.run
             runner = Runner(planner, display, tracker, stop, rest, execute, workers)
             runner.run()
             status, ending = "FINISHED", RunEnding(DONE, artifacts=runner.artifacts)

@@ -62,7 +62,6 @@ def sweep(
     dry_run: options.DryRun = False,
     on_code_change: options.OnCodeChange = "report",
     quiet: options.Quiet = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON (with --dry-run).")] = False,
     runs: options.RunsFolder = options.RUNS,
 ) -> None:
     """Run a sweep, or print its plan; exits with the code of the run."""
@@ -72,7 +71,7 @@ def sweep(
     further += ["--points", str(points)] if points != MOST_POINTS else []
     request = Request(recipe, overrides or (), Runs(runs), settings, "sweep", further)
     if dry_run:
-        plan_sweep(request, file, stdout_console(), as_json, points)
+        plan_sweep(request, file, stdout_console(), most=points)
         return
     with ignoring_broken_outputs():
         raise typer.Exit(run_sweep(request, file, jobs, points, stdout_console(), quiet))

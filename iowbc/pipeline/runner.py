@@ -59,11 +59,6 @@ class StageReport:
         self.display.say(prefix + text.removeprefix(prefix))
 
 
-def run_here(stage: Stage, job: Job) -> None:
-    """Carries a stage out in this process."""
-    stage.run(job)
-
-
 @dataclass(eq=False)
 class Runner:
     """One run of a recipe."""
@@ -74,8 +69,8 @@ class Runner:
     interrupted: Callable[[], bool]
     command: Callable[[], str] = lambda: ""
     """Command that resumes this run after the stages in `made`; recorded with each stage while it runs."""
-    execute: Callable[[Stage, Job], None] = run_here
-    """Function that runs a stage, here or on a cluster with the same result."""
+    execute: Callable[[Stage, Job], None] | None = None
+    """Function that runs a stage on a cluster, with the same result as here."""
     workers: int = 0
     """Worker processes of a stage if neither options nor recipe set them; 0: one per core."""
     artifacts: dict[str, Artifact] = field(default_factory=dict)
@@ -201,7 +196,10 @@ class Runner:
             predecessor=None if step.predecessor is None else step.predecessor.folder,
         )
         try:
-            self.execute(stage, job)
+            if self.execute is None:
+                stage.run(job)
+            else:
+                self.execute(stage, job)
             details = {
                 "stage": stage.name,
                 "version": stage.version,

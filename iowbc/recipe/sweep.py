@@ -180,7 +180,7 @@ def _named(loaded: LoadedRecipe, settings: Mapping[str, JsonValue]) -> LoadedRec
     if not settings:
         return loaded
     name = _slug([loaded.recipe.name, *(f"{_leaf(path)}-{written(value)}" for path, value in settings.items())])
-    if not settings.keys() <= {"seed"}:
+    if not settings.keys() <= {"seed"} or len(name) > LONGEST_NAME:
         digest = hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()[:DIGEST_LENGTH]
         name = f"{name[: LONGEST_NAME - DIGEST_LENGTH - 1]}-{digest}"
     recipe = loaded.recipe.model_copy(update={"name": name})
