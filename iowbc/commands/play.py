@@ -32,7 +32,7 @@ MASS = 4.0
 
 
 @dataclass(frozen=True)
-class Held:
+class GameConditions:
     """Fixed quantities of a skill's game; drawn if empty."""
 
     mass: float | None = None
@@ -94,16 +94,16 @@ def play(
         disturbances=disturbances,
         video=video,
     )
-    held = Held(mass, partner_share, partner)
+    fixed = GameConditions(mass, partner_share, partner)
     if page is not None:
-        play_on_web(store, console, word, stage, request, held, page)
+        play_on_web(store, console, word, stage, request, fixed, page)
         return
     options.require_extra("train", "iowbc play")
     close_on_termination()
     plan = planned(store, word)
     skill = skill_to_play(store, word, stage, plan)
     if skill is not None:
-        play_game(store, console, skill, request, held)
+        play_game(store, console, skill, request, fixed)
         return
     if partner is not None:
         raise UsageError(f"{word}: --partner is the human of a skill's game, and this names no skill")
@@ -122,7 +122,7 @@ def play(
 
 
 def play_on_web(
-    store: Store, console: Console, word: str, stage: str | None, request: PlayRequest, held: Held, port: int
+    store: Store, console: Console, word: str, stage: str | None, request: PlayRequest, fixed: GameConditions, port: int
 ) -> None:
     """Serve the viewer in the browser until interrupted. Raises `UsageError` where it cannot begin."""
     if request.video is not None:
@@ -146,12 +146,12 @@ def play_on_web(
     if skill is not None:
         from iowbc.live.game import GamePanel, GameRequest, GameSession
 
-        held.require_playable(request)
-        if held.partner is not None:
+        fixed.require_playable(request)
+        if fixed.partner is not None:
             raise UsageError("--web and --partner exclude each other: on the page you are the human")
         found = playable_skill(store, skill, request.scene)
         tell(console, f"skill of {skill.manifest.recipe}: you are its partner")
-        first = GameRequest(found.task, request.seed, mass=held.mass, share=held.share)
+        first = GameRequest(found.task, request.seed, mass=fixed.mass, share=fixed.share)
         with GameSession(found.world, found.student, found.robot, first) as game, serving(port) as server:
             Page(server, game, panel=GamePanel).run(ready)
         return
@@ -163,9 +163,9 @@ def play_on_web(
         Page(server, session, actor).run(ready)
 
 
-def play_game(store: Store, console: Console, skill: Artifact, request: PlayRequest, held: Held) -> None:
+def play_game(store: Store, console: Console, skill: Artifact, request: PlayRequest, fixed: GameConditions) -> None:
     """Play a game of a skill in the viewer or as a film; its human alone knows the path. Raises `UsageError`."""
-    held.require_playable(request)
+    fixed.require_playable(request)
 
     from iowbc.skill.game import NOMINAL, ROBOT
     from iowbc.skill.plan import AGENT, Plan
@@ -175,9 +175,9 @@ def play_game(store: Store, console: Console, skill: Artifact, request: PlayRequ
     found = playable_skill(store, skill, request.scene)
     partners = found.world.recipe.skill.partners
     humans = [kind for kind in (*partners.held_out, *partners.training) if kind != AGENT]
-    human = held.partner or humans[0]
+    human = fixed.partner or humans[0]
     require_known(human, "human of the skill", humans)
-    plan = Plan(found.task, human, known=False, mass=held.mass, share=held.share, seed=request.seed)
+    plan = Plan(found.task, human, known=False, mass=fixed.mass, share=fixed.share, seed=request.seed)
     with contextlib.closing(SingleGame(found.world, found.student, NOMINAL | {ROBOT: found.robot}, plan)) as game:
         title = f"{skill.manifest.recipe}: {plan.task}, {game.mass:.0f} kg, partner {human}, seed {request.seed}"
         tell(console, title)

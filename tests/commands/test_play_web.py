@@ -7,7 +7,7 @@ import pytest
 from rich.console import Console
 
 from iowbc.commands import options
-from iowbc.commands.play import Held, play_on_web
+from iowbc.commands.play import GameConditions, play_on_web
 from iowbc.errors import UsageError
 from iowbc.evaluation.play_request import PlayRequest
 from iowbc.pipeline.store.runs import Runs
@@ -15,7 +15,9 @@ from iowbc.pipeline.store.store import Store
 
 
 def play(folder: Path, port: int, **asked: Path) -> None:
-    play_on_web(Store(Runs(folder)), Console(), "first", None, PlayRequest(video=asked.get("video")), Held(), port)
+    play_on_web(
+        Store(Runs(folder)), Console(), "first", None, PlayRequest(video=asked.get("video")), GameConditions(), port
+    )
 
 
 def test_a_taken_port_is_told_before_anything_is_loaded_with_one_that_is_free(tmp_path: Path) -> None:
