@@ -1,5 +1,6 @@
 """Lookup of artifacts, recipes and trainings by name, and of the inputs that an artifact was made from."""
 
+import contextlib
 import json
 import os
 import shutil
@@ -7,6 +8,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from pydantic import ValidationError
 
 from iowbc.deploy.exported_folder import SHORTEST_PREFIX
 from iowbc.errors import UsageError, nearest
@@ -99,10 +102,12 @@ def _recipe(store: Store, word: str, name: str, published: Mapping[str, Mapping[
         own = [artifact for artifact in shipped.values() if artifact.manifest.recipe == name]
         return Run(word, shipped, max(own, key=lambda artifact: artifact.manifest.made).recipe)
     used = last_used(store, name)
-    recipe = Recipe.model_validate(record.recipe)
-    for stage, artifact in shipped.items():
-        if stage not in used and _continues(stage, artifact, recipe, used):
-            used[stage] = artifact
+    if shipped.keys() - used.keys():
+        with contextlib.suppress(ValidationError):  # a record of another version
+            recipe = Recipe.model_validate(record.recipe)
+            for stage, artifact in shipped.items():
+                if stage not in used and _continues(stage, artifact, recipe, used):
+                    used[stage] = artifact
     others = {stage: artifact for stage, artifact in shipped.items() if stage not in used}
     return Run(word, used, record.recipe, others)
 
