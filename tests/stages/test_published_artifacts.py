@@ -36,6 +36,7 @@ PUBLISHED_TO = {
     "compliant_pace": "teacher",
     "compliant_steady": "teacher",
     "compliant_merged": "export",
+    "compliant_merged_seed_1": "eval",
     "compliant_merged_seed_2": "eval",
     "drake": "eval",
     "experts/quick": "distill",
