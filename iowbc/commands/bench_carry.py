@@ -84,7 +84,7 @@ def carry(
     }
     overrides = [f"eval.public.{name}={json.dumps(value)}" for name, value in values.items()]
     overrides.append(f"task.references.upright={json.dumps(not posture)}")
-    files = {name: recipe_file(f"public/{file}") for name, file in SUITES.items()}
+    files = {name: recipe_file(str(Path("public", file))) for name, file in SUITES.items()}
     skipped = "left out by --engine mujoco" if engine == "mujoco" else None if drake else NO_DRAKE
     recipes = {name: load_recipe(files[name], overrides).recipe for name in SUITES if name == "mujoco" or not skipped}
     played = {name: _play(recipe, workers or available_cores()) for name, recipe in recipes.items()}

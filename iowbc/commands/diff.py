@@ -52,12 +52,14 @@ def difference_lines(a: Run, b: Run) -> Iterator[str]:
 
 
 def _either(store: Store, word: str) -> Run:
-    """The run that a word names. For a recipe file, or the name of one that has not run, the recipe is read from the
-    file, and the artifacts are those it used last."""
+    """The run that a word names. For a recipe file, or the name of one that has not run here, the recipe is read from
+    the file, and the artifacts are those it used last."""
     file = recipe_file(word)
     there = os.path.isfile(file)
     try:
-        found, as_file = named(store, word), there and Path(word).suffix in SUFFIXES
+        found = named(store, word)
+        shipped = all(artifact.published for artifact in found.artifacts.values())
+        as_file = there and (shipped or Path(word).suffix in SUFFIXES)
     except UsageError:
         if not there:
             raise

@@ -100,7 +100,7 @@ def _recipe(store: Store, word: str, name: str, published: Mapping[str, Mapping[
         raise UsageError(f"recipe {word} has no finished stage in {store.runs.root}; those that have: {listing}")
     if not record.stages:
         own = [artifact for artifact in shipped.values() if artifact.manifest.recipe == name]
-        return Run(word, shipped, max(own, key=lambda artifact: artifact.manifest.made).recipe)
+        return Run(word, shipped, own[-1].recipe)
     used = last_used(store, name)
     if shipped.keys() - used.keys():
         with contextlib.suppress(ValidationError):  # a record of another version

@@ -101,16 +101,16 @@ def test_the_end_of_a_run_is_short_names_links_and_the_next_commands(folder: Pat
     assert len(lines) < 35
 
 
-def only_results(_: str, names: list[str]) -> list[str]:
-    """All but the tables and trials of an evaluation."""
-    return [name for name in names if name != "tables" and not name.endswith((".md", ".parquet"))]
+def only_tables(folder: str, names: list[str]) -> list[str]:
+    """All but the tables of an evaluation."""
+    return [] if Path(folder).name == "tables" else [name for name in names if name != "tables"]
 
 
 def test_the_end_of_the_largest_run_fits_a_screen_of_80_columns(folder: Path) -> None:
     runs = Runs(folder / "runs")
     artifacts = last_used(Store(runs), "first")
     tables = max((PUBLISHED / "eval").glob("*/tables"), key=lambda path: (path / "pushing.md").stat().st_size)
-    shutil.copytree(tables.parent, runs.root / "first" / "eval", ignore=only_results, dirs_exist_ok=True)
+    shutil.copytree(tables.parent, runs.root / "first" / "eval", ignore=only_tables, dirs_exist_ok=True)
     lines = shown(80, lambda console: print_results(runs, "first", artifacts, console)).splitlines()
     assert len(lines) < 70
     assert "Success in the heavy tasks" in lines

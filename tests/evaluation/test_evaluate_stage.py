@@ -213,7 +213,7 @@ def test_a_trial_does_not_depend_on_the_batch_it_is_played_in(recipe: Recipe, st
     for place, row in enumerate(table.query("kind != 'heavy'").to_dict("records")):
         policy = in_batch(load_policy(student), pd.Series(row))
         (alone,) = play_episodes(world, [trials[place].episode], policy, workers=0)
-        assert float(np.sum(alone.trace.power) * alone.trace.dt) == row["energy"]
+        assert np.float32(np.sum(alone.trace.power) * alone.trace.dt) == row["energy"]
 
 
 def test_variants_meet_the_same_trials_in_a_pinned_world(student: Path, tmp_path: Path) -> None:

@@ -183,6 +183,6 @@ def test_gc_keeps_what_another_recipe_begins_from(workplace: Workplace, second: 
     assert workplace.command("run", second).code == 0
     assert workplace.command("run", "small.yaml").code == 0
     removed = workplace.command("gc", "--recipe", "small").output
-    assert "removed runs/store/eval/" in removed
+    assert "removed runs/recipes/small.json" in removed
     assert "runs/store/teacher" not in removed
     assert workplace.command("plan", second).output.count("cached") == 6

@@ -120,10 +120,10 @@ def test_what_no_student_or_nobody_carries_out_is_said_before_anything_runs() ->
     assert len(found) == 2
     assert "learnt_share" in found[0]
     assert "no task 'lift_strait'" in found[1]
-    alike = transport(**{"skill.eval.label": "scripted leader"})
+    alike = transport(**{"skill.eval.label": "admittance follower"})
     ((path, text),) = skill_eval.problems(alike)
     assert path == "skill.eval"
-    assert "the rule `lead`" in text
+    assert "the rule `follow`" in text
     unfit = transport(**{"stages": ("teacher", "distill", "skill-eval"), "skill.eval.masses": {"push": (10.0,)}})
     unfit = with_changes(unfit, {"skill.eval.controllers": {"WBC": "wbc.yaml"}, "skill.eval.partners": ("path",)})
     assert [path for path, _ in skill_eval.problems(unfit)] == ["skill.eval.controllers", "skill.eval.masses.push"]
