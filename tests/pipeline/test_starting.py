@@ -185,4 +185,4 @@ def test_gc_keeps_what_another_recipe_begins_from(workplace: Workplace, second: 
     removed = workplace.command("gc", "--recipe", "small").output
     assert "removed runs/recipes/small.json" in removed
     assert "runs/store/teacher" not in removed
-    assert workplace.command("plan", second).output.count("cached") == 6
+    assert "all stages are cached" in workplace.command("plan", second).output
