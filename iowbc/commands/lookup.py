@@ -105,19 +105,22 @@ def _recipe(store: Store, word: str, name: str, published: Mapping[str, Mapping[
     if shipped.keys() - used.keys():
         with contextlib.suppress(ValidationError):  # a record of another version
             recipe = Recipe.model_validate(record.recipe)
+            values = deciding(recipe)
             for stage, artifact in shipped.items():
-                if stage not in used and _continues(stage, artifact, recipe, used):
+                key_values = STAGES[stage].key_values(recipe, values)
+                if stage not in used and _continues(artifact, key_values, used):
                     used[stage] = artifact
     others = {stage: artifact for stage, artifact in shipped.items() if stage not in used}
     return Run(word, used, record.recipe, others)
 
 
-def _continues(name: str, artifact: Artifact, recipe: Recipe, used: Mapping[str, Artifact]) -> bool:
-    """True for a published artifact of a stage that a recipe would use after the artifacts that it used last."""
-    stage, known = STAGES[name], artifact.ingredients
-    inputs = {source: used[source].manifest.digest for source in known.get("inputs", {}) if source in used}
-    same = known.get("inputs", {}).items() >= inputs.items() and known.get("version") == stage.version
-    return same and known.get("recipe") == stage.key_values(recipe, deciding(recipe))
+def _continues(artifact: Artifact, key_values: Mapping[str, Any], used: Mapping[str, Artifact]) -> bool:
+    """True for a published artifact that a recipe with these values would use after those that it used last."""
+    known = artifact.ingredients
+    read = known.get("inputs", {})
+    inputs = {source: used[source].manifest.digest for source in read if source in used}
+    version = STAGES[artifact.manifest.stage].version
+    return read.items() >= inputs.items() and (known.get("version"), known.get("recipe")) == (version, key_values)
 
 
 def _name_in(word: str) -> str:

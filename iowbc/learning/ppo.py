@@ -57,7 +57,7 @@ class Learner:
         for the value network only; `device`: torch device of the networks."""
         set_random_seed(seed)
         env.seed(seed)
-        self.settings, self.env, self.mirrors, self.device = teacher, env, mirrors, torch.device(device)
+        self.settings, self.env, self.device = teacher, env, torch.device(device)
         self._on_cpu = self.device.type == "cpu"
         self.in_parallel = ParallelBatch(teacher.parts if self._on_cpu else 1, cores)
         self._arguments = _policy_arguments(teacher, env, mirrors, value_only)

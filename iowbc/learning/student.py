@@ -59,7 +59,7 @@ class StudentTraining:
         teacher; `symmetry`: of the teachers. The student takes over the first teacher's normalisation and, if
         `settings.start` is "teacher", its body, or the whole network of a teacher that is a student itself."""
         torch.manual_seed(seed)
-        self.settings, self.environments, self.rows, self.symmetry = settings, environments, rows, symmetry
+        self.settings, self.environments, self.rows = settings, environments, rows
         self.teachers, self.teacher_of = tuple(map(numpy_policy, teachers)), teacher_of
         teacher = teachers[0]
         size, actions = rows.observation.stop, environments.action_space.shape[0]

@@ -22,6 +22,12 @@ Command = Callable[..., "subprocess.CompletedProcess[str]"]
 Key = Callable[[str, str], str]
 
 
+def forget(folder: Path) -> None:
+    """Remove all but what is published."""
+    for name in ("store", "recipes", "first", "second"):
+        shutil.rmtree(folder / "runs" / name)
+
+
 @pytest.mark.parametrize("word", ["first", "first.yaml"])
 def test_a_recipe_and_its_stages_are_named_alike_everywhere(folder: Path, command: Command, word: str) -> None:
     (folder / "recipes").mkdir()
@@ -58,8 +64,7 @@ def test_what_is_published_goes_by_its_recipes_name_before_anything_ran(
     folder: Path, command: Command, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert command("publish", "first.yaml").returncode == 0
-    for name in ("store", "recipes", "first", "second"):
-        shutil.rmtree(folder / "runs" / name)
+    forget(folder)
     assert "teacher" in command("show", "first").stdout
     assert "did you mean 'first'?" in command("show", "frist").stderr
     assert "first (published)" in command("ls").stdout
@@ -72,8 +77,7 @@ def test_what_is_published_goes_by_its_recipes_name_before_anything_ran(
 def test_what_was_published_for_another_recipe_is_found_by_each_that_used_it(folder: Path, command: Command) -> None:
     for name in ("first", "second"):
         assert command("publish", f"{name}.yaml").returncode == 0
-    for name in ("store", "recipes", "first", "second"):
-        shutil.rmtree(folder / "runs" / name)
+    forget(folder)
     store = Store(Runs(folder / "runs"))
     found, own = named(store, "second"), [one for one in store.artifacts() if one.manifest.recipe == "second"]
     assert [*found.artifacts] == ["rg-dataset", "rg-fit", "teacher", "distill", "export"]
@@ -85,8 +89,7 @@ def test_a_run_that_has_begun_does_not_hide_what_is_published_until_it_has_its_o
     folder: Path, command: Command, key: Key
 ) -> None:
     assert command("publish", "first.yaml").returncode == 0
-    for name in ("store", "recipes", "first", "second"):
-        shutil.rmtree(folder / "runs" / name)
+    forget(folder)
     (folder / "first.yaml").write_text("seed: 5\nexecution: {track: false}\n")
     assert command("run", "first.yaml", "--until", "teacher").returncode == 0
     store = Store(Runs(folder / "runs"))
@@ -105,8 +108,7 @@ def test_what_is_published_and_would_be_used_next_belongs_to_a_run_that_ended_ea
     folder: Path, command: Command
 ) -> None:
     assert command("publish", "first.yaml").returncode == 0
-    for name in ("store", "recipes", "first", "second"):
-        shutil.rmtree(folder / "runs" / name)
+    forget(folder)
     assert command("run", "first.yaml", "--until", "rg-fit").returncode == 0
     assert "attempt" in command("show", "first/export").stdout
     assert "export" in command("show", "first").stdout
@@ -125,8 +127,7 @@ def test_a_run_with_overrides_neither_takes_a_published_name_nor_is_mixed_with_o
     folder: Path, command: Command
 ) -> None:
     assert command("publish", "first.yaml").returncode == 0
-    for name in ("store", "recipes", "first", "second"):
-        shutil.rmtree(folder / "runs" / name)
+    forget(folder)
     store = Store(Runs(folder / "runs"))
     assert command("run", "first.yaml", "--until", "teacher", "--set", "teacher.steps=9999").returncode == 0
     assert all(artifact.published for artifact in named(store, "first").artifacts.values())
