@@ -13,7 +13,9 @@ from iowbc.task.commands.script import CommandScript, CommandSegment
 
 DT = 0.02
 JOINTS = {"hip": 80.0, "knee": 100.0}
-ROBOT: Any = SimpleNamespace(joints=tuple(JOINTS), effort=np.array([*JOINTS.values()]))
+ROBOT: Any = SimpleNamespace(
+    joints=tuple(JOINTS), effort=np.array([*JOINTS.values()]), linkages=np.zeros((0, 2), np.intp)
+)
 """All of a robot that its measurement needs."""
 RECIPE = Recipe.model_validate(
     {"name": "x", "task": {"references": {"gait": {"frequency": 1.25}}, "commands": {"nominal_height": 0.75}}}
@@ -36,10 +38,20 @@ def script(seconds: float = 8.0, velocity: tuple[float, float, float] = (0.0, 0.
     return CommandScript((CommandSegment(seconds, (*velocity, 0.75, 0.0, *[0.0] * 6)),))
 
 
-def outcome(signals: Trace, mass: float = 0.0, friction: float = 1.0, rolling: float = 0.0) -> Outcome:
-    """A trial that was survived, with the drawn mass [kg], friction of the ground and rolling resistance [N]."""
+def outcome(
+    signals: Trace,
+    mass: float = 0.0,
+    friction: float = 1.0,
+    rolling: float = 0.0,
+    strength: float = 1.0,
+    robot: Any = ROBOT,
+) -> Outcome:
+    """A trial that was survived, with the drawn mass [kg], friction of the ground, rolling resistance [N] and strength
+    of the motors."""
     drawn = {"object_mass": mass, "ground_friction": friction, "rolling_resistance": rolling}
     seconds, values = DT * len(signals), {name: np.array([value]) for name, value in drawn.items()}
+    values |= {"motor_strength": np.full(len(robot.joints), strength)}
+    values |= {"linkage_effort": np.full(len(robot.linkages), 50.0)}
     return Outcome(signals, seconds, fallen=False, dropped=False, finished=True, drawn=values)
 
 
@@ -62,7 +74,7 @@ def trace(steps: int = 400) -> Trace:
         link_object_force=zeros,
         grip_force=np.zeros((steps, 6)),
         external_force=vectors,
-        handle_velocity=vectors,
+        handle_displacement=vectors,
         partner_velocity=vectors,
         power=np.full(steps, 100.0),
         base_position=vectors,

@@ -21,10 +21,7 @@ class Drives:
         self._kp, self._kd = robot.kp[robot.linkages], robot.kd[robot.linkages]
 
     def reset(self, which: Indices, drawn: dict[str, Array]) -> None:
-        pairs, strength = self._robot.linkages, drawn["motor_strength"][which]
-        self.effort[which] = self._robot.effort * strength
-        together = drawn["linkage_effort"][which] * strength[:, pairs].mean(axis=2)
-        self.effort[which[:, None, None], pairs] = together[..., None]
+        self.effort[which] = drawn_effort(self._robot, drawn["motor_strength"][which], drawn["linkage_effort"][which])
 
     def ranges(self, target: Array, state: SimulationState) -> Array:
         """Least and greatest torque of each motor over the next period, (n, joints, 2) [N·m]; `target` (n, joints)
@@ -54,3 +51,11 @@ class Drives:
         both = wanted[..., 0] + wanted[..., 1]
         scale = np.minimum(1.0, limit[..., 0] / np.maximum(both, 1e-9))
         effort[:, pairs] = limit - wanted[..., ::-1] * scale[..., None]
+
+
+def drawn_effort(robot: Robot, strength: Array, linkage_effort: Array) -> Array:
+    """Torque limits of motors and linkages at low speed, (n, joints) [N·m], from the drawn strengths (n, joints) and
+    the nominal limits of the linkages (n, linkages) [N·m]."""
+    effort, pairs = robot.effort * strength, robot.linkages
+    effort[:, pairs] = (linkage_effort * strength[:, pairs].mean(axis=2))[..., None]
+    return effort

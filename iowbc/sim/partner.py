@@ -68,6 +68,8 @@ class Partner:
         self._aim, self._unsteady, self._centre = np.zeros((n, 3)), np.zeros((n, 2)), self._places[:, 1]
         self._at, self._speed, self._arm = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3))
         self._force, self._energy = np.zeros((n, 3)), np.zeros(n)
+        self.handle_displacement = np.zeros((n, 3))
+        """Displacements of the handles in the last period, (n, 3) [m]; zero without an object. Not in snapshots."""
         self._behaviour, self._steps, self._attention = np.zeros(n), np.zeros(n, np.int64), np.ones(n)
         self._turning, self._sideways, self._rise = np.zeros(n), np.zeros(n), np.zeros(n)
         self._stop, self._halted = np.zeros((n, 2)), np.zeros(n)
@@ -288,9 +290,9 @@ class Partner:
             return
         before = self._at
         self._observe(state)
+        way = self.handle_displacement = self._at - before
         if not self._any:
             return
-        way = self._at - before
         self._energy += self._force[:, 0] * way[:, 0] + self._force[:, 1] * way[:, 1] + self._force[:, 2] * way[:, 2]
         state.partner_force[:] = self._force
         state.partner_energy[:] = self._energy

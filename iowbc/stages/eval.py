@@ -202,7 +202,7 @@ def _load(row: "pd.Series[Any]") -> str:
 
 STAGE = Stage(
     name="eval",
-    version=6,
+    version=7,
     slice=("rg.height", "simulation", "task", "eval"),
     reads=lambda recipe: (*generator_stage(recipe), *acting_stage(recipe)),
     run=run,

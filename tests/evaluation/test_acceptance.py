@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_up_trials import DT, RECIPE, ROBOT, script, trace
+from made_up_trials import DT, RECIPE, ROBOT, outcome, script, trace
 
 from iowbc.evaluation.acceptance import Accepted, judged
 from iowbc.evaluation.trials.trace import Outcome
@@ -27,11 +27,8 @@ def played(
     grip[:, [2, 5]] = -0.5 * in_hands * MASS * GRAVITY
     path[:, 0] = covered * WALK[0] * DT * np.arange(STEPS)
     moved = replace(signals, grip_force=grip, base_position=path, object_position=np.add(path, [0.3, beside, 1.0]))
-    values = {"object_mass": MASS, "ground_friction": 1.0, "rolling_resistance": 0.0}
-    drawn = {name: np.array([value]) for name, value in values.items()}
-    outcome = Outcome(moved, 8.0, fallen=fallen, dropped=False, finished=not fallen, drawn=drawn)
     commands = script(8.0, WALK if covered else (0.0, 0.0, 0.0))
-    return Episode("lift", 0, 8.0, {}, commands), outcome
+    return Episode("lift", 0, 8.0, {}, commands), replace(outcome(moved, MASS), fallen=fallen, finished=not fallen)
 
 
 def accepted(*trials: tuple[Episode, Outcome], minimum: int = 1) -> Accepted:

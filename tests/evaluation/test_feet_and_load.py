@@ -49,6 +49,7 @@ def test_swing_clearance_is_the_mean_of_the_highest_points_of_each_foot() -> Non
     for begin, height in ((10, 0.06), (50, 0.10)):
         contact[begin : begin + 20, 0] = 0
         position[begin : begin + 20, 2] = height * np.sin(np.pi * np.linspace(0, 1, 20))
+    contact[80:82, 0] = contact[84:88, 1] = 0  # chatter
     metrics = foot_metrics(replace(signals, foot_contact=contact, foot_position=position), 50.0, walked=1.0)
     assert metrics["swings"] == 2
     assert metrics["swing_clearance_left"] == pytest.approx(0.08, rel=0.01)
@@ -64,7 +65,8 @@ def test_what_the_partner_bears_is_not_asked_of_the_hands() -> None:
     signals = trace(200)
     grip, partner = signals.grip_force.copy(), signals.partner_force.copy()
     grip[:, [2, 5]], partner[:, 2] = -20.0, 40.0  # 40 N by the hands, 40 N by the partner, of 80 N
-    metrics = load_metrics(replace(signals, grip_force=grip, partner_force=partner), 80.0, 5.0)
+    held = replace(signals, grip_force=grip, partner_force=partner, external_force=partner)
+    metrics = load_metrics(held, 80.0, 5.0)
     assert metrics["hand_weight_share"] == pytest.approx(0.5)
     assert metrics["partner_weight_share"] == pytest.approx(0.5)
     assert metrics["weight_in_hands"] == pytest.approx(1.0)
@@ -75,6 +77,15 @@ def test_weight_on_the_thighs_is_not_in_the_hands() -> None:
     grip = signals.grip_force.copy()
     grip[:, [2, 5]] = -10.0
     assert load_metrics(replace(signals, grip_force=grip), 40.0, 5.0)["weight_in_hands"] == pytest.approx(0.5)
+
+
+def test_impulses_on_the_object_load_the_hands_beyond_its_weight() -> None:
+    signals = trace(200)
+    grip, external = signals.grip_force.copy(), signals.external_force.copy()
+    grip[:, [2, 5]], external[60:70, 2] = -20.0, -70.0
+    grip[60:70, [2, 5]] -= 35.0
+    held = replace(signals, grip_force=grip, external_force=external)
+    assert load_metrics(held, 40.0, 5.0)["weight_in_hands"] == pytest.approx(1.0)
 
 
 def test_where_a_weight_rests_that_a_touch_exceeds_is_not_asked() -> None:

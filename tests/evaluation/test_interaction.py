@@ -30,19 +30,20 @@ def test_hand_force_is_horizontal_and_that_of_each_hand() -> None:
 def test_work_on_the_partner_is_what_a_spring_stores_and_nothing_over_a_cycle() -> None:
     stiffness, time = 200.0, DT * np.arange(400)
     stretch = 0.05 * np.sin(2 * np.pi * time / 2.0)  # four cycles of 2 s in 8 s
-    force = np.stack([-stiffness * stretch, np.zeros(400), np.full(400, 40.0)], axis=1)
-    rate = np.stack([0.05 * np.pi * np.cos(np.pi * time), np.zeros(400), np.ones(400)], axis=1)
-    whole = holding(partner_force=force, handle_velocity=rate)
+    after = 0.05 * np.sin(np.pi * (time + DT))
+    force = np.stack([-0.5 * stiffness * (stretch + after), np.zeros(400), np.full(400, 40.0)], axis=1)
+    way = np.stack([after - stretch, np.zeros(400), np.full(400, DT)], axis=1)
+    whole = holding(partner_force=force, handle_displacement=way)
     assert interaction_metrics(whole, WINDOW)["partner_work"] == pytest.approx(0.0, abs=1e-6), (
         "the weight does not count"
     )
-    quarter = holding(25, partner_force=force[:25], handle_velocity=rate[:25])
+    quarter = holding(25, partner_force=force[:25], handle_displacement=way[:25])
     assert interaction_metrics(quarter, WINDOW)["partner_work"] == pytest.approx(0.5 * stiffness * 0.05**2, rel=0.01)
 
 
 def test_a_partner_that_is_followed_and_one_that_is_not() -> None:
     force, leading = np.tile([10.0, 0.0, 0.0], (400, 1)), np.tile([0.3, -0.4, 0.1], (400, 1))
-    followed = holding(partner_force=force, partner_velocity=leading, handle_velocity=leading)
+    followed = holding(partner_force=force, partner_velocity=leading, handle_displacement=DT * leading)
     assert interaction_metrics(followed, WINDOW)["E_v_partner"] == pytest.approx(0.0, abs=1e-12)
     resisted = holding(partner_force=force, partner_velocity=leading)
     metrics = interaction_metrics(resisted, WINDOW)

@@ -14,9 +14,10 @@ from iowbc.task.commands.script import CommandScript
 from iowbc.task.episodes import Episode
 
 
-def metrics_of(signals: Trace, commands: CommandScript | None = None) -> dict[str, float]:
+def metrics_of(signals: Trace, commands: CommandScript | None = None, strength: float = 1.0) -> dict[str, float]:
     commands = commands or script()
-    return trial_metrics(RECIPE, ROBOT, Episode("free", 0, commands.duration, script=commands), outcome(signals))
+    episode = Episode("free", 0, commands.duration, script=commands)
+    return trial_metrics(RECIPE, ROBOT, episode, outcome(signals, strength=strength))
 
 
 def test_a_perfect_trial_has_no_error() -> None:
@@ -134,6 +135,8 @@ def test_torque_is_measured_against_the_limit_of_each_joint_and_the_worst_one_co
     assert metrics["torque_rms/hip"] == pytest.approx(0.25)
     assert metrics["torque_rms/knee"] == pytest.approx(0.3 / 2**0.5)
     assert metrics["torque_rms"] == metrics["torque_rms/hip"]
+    weak = metrics_of(replace(trace(), joint_torque=torque), strength=0.5)
+    assert weak["torque_rms/hip"] == pytest.approx(0.5), "20 of 40 N·m"
 
 
 def test_the_raw_velocity_error_is_told_of_the_moving_part_too() -> None:

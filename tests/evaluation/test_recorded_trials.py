@@ -86,7 +86,7 @@ def test_the_row_of_a_partner_has_its_force_its_work_and_its_motion(
     assert row["handle_force_peak"] == pytest.approx(np.hypot(*trace.partner_force[:, :2].T).max())
     assert np.isfinite(row["partner_work"])
     assert np.any(trace.partner_velocity)
-    assert np.any(trace.handle_velocity)
+    assert np.any(trace.handle_displacement)
     assert np.isnan(row["impedance_magnitude"])
     assert row["pull_direction"] == ""
 

@@ -54,7 +54,7 @@ def statue(trial: Trial) -> Outcome:
         joint_torque=np.zeros((steps, len(ROBOT.joints))),
         joint_saturation=np.zeros((steps, len(ROBOT.joints))),
     )
-    return outcome(recorded, trial.mass, friction=0.5, rolling=38.0)
+    return outcome(recorded, trial.mass, friction=0.5, rolling=38.0, robot=ROBOT)
 
 
 @pytest.mark.parametrize("suite", SUITES)

@@ -126,11 +126,15 @@ def test_energy_of_the_partner_is_force_times_way(start, calm, hold_base):
     }
     recipe = changed(recipe, "partner.push_yielding", 1.0)
     simulation = start(recipe, ["push"], **held)
-    begin = simulation.state.object_position[0, 0]
+    begin, handle = simulation.state.object_position[0, 0], simulation.partner.at
     simulation.feed[:, :3] = (0.3, 0.0, 0.0)
-    run(simulation, 60)
+    displacements = []
+    for _ in range(60):
+        run(simulation, 1)
+        displacements.append(simulation.partner.handle_displacement.copy())
     way = simulation.state.object_position[0, 0] - begin
     assert way > 0.1
+    assert np.sum(displacements, axis=0) == pytest.approx(simulation.partner.at - handle, abs=1e-12)
     assert simulation.state.partner_energy[0] == pytest.approx(simulation.state.partner_force[0, 0] * way, rel=0.02)
 
 

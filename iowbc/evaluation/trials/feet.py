@@ -8,7 +8,7 @@ from iowbc.evaluation.trials.trace import Trace
 SHORTEST_WALK = 0.5
 """Minimum walked distance for slip per metre [m]."""
 SHORTEST_SWING = 0.1
-"""Minimum time in the air before a touchdown; shorter intervals are contact chatter [s]."""
+"""Minimum time of a swing; shorter intervals in the air are contact chatter [s]."""
 LOW, HIGH = 5.0, 95.0
 """Percentiles for the worse end of a quantity within a trial."""
 
@@ -22,6 +22,7 @@ def foot_metrics(trace: Trace, load: float, walked: float) -> dict[str, float]:
     of the foot does not count. `foot_slip_peak`: largest slip in one stance [m]. `foot_drift`: displacement of a sole
     during a stance, summed over the stances of both feet [m]. `_per_metre`: either per metre walked; NaN below
     `SHORTEST_WALK`. `swing_clearance_left`, `_right`: maximum sole height, mean over swings [m]; zero without a swing.
+    `swings`: their number, both feet.
     """
     loaded = trace.foot_load >= load
     slid = trace.foot_slide * loaded * trace.dt
@@ -30,7 +31,7 @@ def foot_metrics(trace: Trace, load: float, walked: float) -> dict[str, float]:
     slips = [float(slid[stance, foot].sum()) for foot, stance in stances]
     drifts = [position[stance.stop - 1, foot, :2] - position[stance.start, foot, :2] for foot, stance in stances]
     slip, drift = sum(slips), float(sum(np.hypot(*moved) for moved in drifts))
-    swings = [[position[run, foot, 2].max() for run in runs(trace.foot_contact[:, foot] == 0)] for foot in range(2)]
+    swings = [[position[swing, foot, 2].max() for swing in _swings(trace, foot)] for foot in range(2)]
     return {
         "foot_slip": slip,
         "foot_slip_peak": max(slips, default=0.0),
@@ -57,12 +58,11 @@ def ground_metrics(trace: Trace, load: float, friction: float) -> dict[str, floa
     force as a fraction of the friction limit at the foot's load, mean weighted by the load, and `friction_use_high`,
     its 95th percentile. NaN if no foot was loaded.
     """
-    shortest = round(SHORTEST_SWING / trace.dt)
     speeds = [
         max(float(trace.foot_sink[swing.stop - 1, foot]), 0.0)
         for foot in range(2)
-        for swing in runs(trace.foot_contact[:, foot] == 0)
-        if swing.stop - swing.start >= shortest and swing.stop < len(trace)
+        for swing in _swings(trace, foot)
+        if swing.stop < len(trace)
     ]
     loaded = trace.foot_load >= load
     borne, margin = trace.foot_load[loaded], trace.foot_margin[loaded]
@@ -76,6 +76,12 @@ def ground_metrics(trace: Trace, load: float, friction: float) -> dict[str, floa
         "friction_use": float(np.average(use, weights=borne)) if len(borne) else np.nan,
         "friction_use_high": float(np.percentile(use, HIGH)) if len(borne) else np.nan,
     }
+
+
+def _swings(trace: Trace, foot: int) -> list[slice]:
+    """Swings of a foot, in order; the last may end with the trial."""
+    shortest = round(SHORTEST_SWING / trace.dt)
+    return [run for run in runs(trace.foot_contact[:, foot] == 0) if run.stop - run.start >= shortest]
 
 
 def runs(mask: Mask) -> list[slice]:

@@ -15,15 +15,16 @@ def load_metrics(trace: Trace, weight: float, least: float) -> dict[str, float]:
     """Fractions of a held object's `weight` [N], means over the trial without its first second; NaN if nothing is held.
 
     `hand_weight_share`: the hands' vertical force over the weight. `partner_weight_share`: the partner's.
-    `weight_in_hands`: the hands' part of the load on the robot, contacts of other links included; NaN if that load is
-    not above `least` [N], since a touch of the torso would then dominate.
+    `weight_in_hands`: the hands' part of the load on the robot, which is the weight less all external vertical forces;
+    the rest is borne by contacts of other links. NaN if that load is not above `least` [N], since a touch of the torso
+    would then dominate.
     """
     begin = round(SETTLING / trace.dt)
     if not weight > 0 or len(trace) <= begin:
         return dict.fromkeys(("hand_weight_share", "partner_weight_share", "weight_in_hands"), np.nan)
     hands = float(np.mean(-trace.grip_force[begin:, [2, 5]].sum(axis=1))) / weight
     partner = float(np.mean(trace.partner_force[begin:, 2])) / weight
-    left = 1.0 - partner
+    left = 1.0 - float(np.mean(trace.external_force[begin:, 2])) / weight
     return {
         "hand_weight_share": hands,
         "partner_weight_share": partner,
@@ -38,21 +39,20 @@ def interaction_metrics(trace: Trace, window: int) -> dict[str, float]:
 
     `hand_force_mean`, `_p95`, `_peak`: horizontal force between object and a hand, of the hand with more [N], in
     compliant grasps without the pressure of the palms; NaN without an object. `handle_force_mean`, `_p95`, `_peak`: of
-    the partner at the far handle [N]; `partner_work`: horizontal work done on the partner [J], with the handle's
-    velocity at the end of each step, which gives 2 to 12 J too little in a held lift; `E_v_partner`: mean planar
-    deviation of the handle's velocity, averaged over a gait period, from the one that the partner intends [m/s]; NaN
-    without a partner.
+    the partner at the far handle [N]; `partner_work`: horizontal work done on the partner [J]; `E_v_partner`: mean
+    planar deviation of the handle's velocity, averaged over a gait period, from the one that the partner intends [m/s];
+    NaN without a partner.
     """
     none = np.full(1, np.nan)
     at_hands = np.linalg.norm(hand_forces(trace), axis=-1) if np.any(trace.object_position) else none
     helped = np.any(trace.partner_force)
     handle = trace.partner_force[:, :2]
-    work = -np.sum(handle * trace.handle_velocity[:, :2]) * trace.dt
-    away = moving_average(trace.handle_velocity[:, :2], window) - trace.partner_velocity[:, :2]
+    way = trace.handle_displacement[:, :2]
+    away = moving_average(way / trace.dt, window) - trace.partner_velocity[:, :2]
     return {
         **_spread("hand_force", at_hands),
         **_spread("handle_force", np.linalg.norm(handle, axis=1) if helped else none),
-        "partner_work": float(work) if helped else np.nan,
+        "partner_work": -float(np.sum(handle * way)) if helped else np.nan,
         "E_v_partner": float(np.mean(np.linalg.norm(away, axis=1))) if helped else np.nan,
     }
 

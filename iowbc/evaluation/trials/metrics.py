@@ -1,5 +1,7 @@
 """Metrics of a trial from its signals."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from iowbc.arrays import Array
@@ -12,6 +14,7 @@ from iowbc.evaluation.trials.trace import Outcome, Trace
 from iowbc.evaluation.trials.transport import beside, commanded_path, covered
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import GRAVITY, Robot
+from iowbc.sim.drives import drawn_effort
 from iowbc.task.episodes import Episode
 
 
@@ -33,6 +36,7 @@ def trial_metrics(recipe: Recipe, robot: Robot, episode: Episode, outcome: Outco
     mass, friction, rolling = (
         float(outcome.drawn[name][0]) for name in ("object_mass", "ground_friction", "rolling_resistance")
     )
+    limits = drawn_effort(robot, *(outcome.drawn[name][None] for name in ("motor_strength", "linkage_effort")))[0]
     held_weight = GRAVITY * mass if kind == "lift" else 0.0
     resistance = rolling if kind == "push" else np.inf
     whole = script.at(trace.dt * np.arange(round(script.duration / trace.dt)))
@@ -65,20 +69,21 @@ def trial_metrics(recipe: Recipe, robot: Robot, episode: Episode, outcome: Outco
         **interaction_metrics(trace, window),
         **push_metrics(trace, directions, window, friction, resistance, asked.success.push_force),
         **impedance_metrics(trace, episode.pull),
-        **effort_metrics(trace, robot),
+        **effort_metrics(trace, robot.joints, limits),
     }
 
 
-def effort_metrics(trace: Trace, robot: Robot) -> dict[str, float]:
+def effort_metrics(trace: Trace, joints: Sequence[str], limits: Array) -> dict[str, float]:
     """Effort in the trial: torques, energy, forces at hands and partner, jerk of torso and object, and the root mean
     square of the action's second difference over time and support joints [rad].
 
-    `torque_rms/<joint>`: RMS torque of a joint as a fraction of its nominal limit, which motor strength and linkage may
-    lower in the trial; `torque_rms`: the largest of these.
+    limits: torque limits drawn for the trial's motors and linkages, (joints,) [N·m].
+
+    `torque_rms/<joint>`: RMS torque of a joint as a fraction of its limit; `torque_rms`: the largest of these.
     """
     grips = np.linalg.norm(trace.grip_force.reshape(-1, 2, 3), axis=2)
     peak, saturated = np.abs(trace.joint_torque).max(axis=0), trace.joint_saturation.mean(axis=0)
-    effort = np.sqrt(np.mean(np.square(trace.joint_torque), axis=0)) / robot.effort
+    effort = np.sqrt(np.mean(np.square(trace.joint_torque), axis=0)) / limits
     return {
         "saturation": float(np.mean(trace.saturation)),
         "saturation_peak": float(np.max(trace.saturation)),
@@ -94,7 +99,7 @@ def effort_metrics(trace: Trace, robot: Robot) -> dict[str, float]:
         **{
             f"{name}/{joint}": float(value)
             for name, values in (("peak_torque", peak), ("saturated", saturated), ("torque_rms", effort))
-            for joint, value in zip(robot.joints, values, strict=True)
+            for joint, value in zip(joints, values, strict=True)
         },
     }
 

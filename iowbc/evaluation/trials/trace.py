@@ -39,9 +39,10 @@ class Trace:
     """Magnitude of the net force of links other than the hands on the object, (T,) [N]."""
     grip_force: Array
     """Force of the object on each hand, (T, 6) [N]."""
-    handle_velocity: Array
+    handle_displacement: Array
+    """Displacement of the object's far handle in each period, zero without an object, (T, 3) [m]."""
     partner_velocity: Array
-    """Velocity of the object's far handle, and that intended by the partner; zero without, (T, 3) [m/s]."""
+    """Velocity of the handle that the partner intends; zero without one, (T, 3) [m/s]."""
     power: Array
     """Sum over the joints of |torque x speed|, (T,) [W]."""
     base_position: Array

@@ -69,7 +69,7 @@ def write_trial_signals(buffers: Buffers, simulation: Simulation, correction: Ar
         "foot_shear": np.hypot(state.foot_force[:, :, 0], state.foot_force[:, :, 1]),
         "link_object_force": state.link_object_force[:, None],
         "external_force": state.external_force[:, :3],
-        "handle_velocity": state.handle_velocity,
+        "handle_displacement": simulation.partner.handle_displacement,
         "partner_velocity": state.partner_velocity,
         "joint_torque": state.joint_torque,
         "joint_saturation": state.saturation,

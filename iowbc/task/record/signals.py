@@ -33,15 +33,15 @@ TRIAL_SIGNALS = {
     "foot_shear": 2,
     "link_object_force": 1,
     "external_force": 3,
-    "handle_velocity": 3,
+    "handle_displacement": 3,
     "partner_velocity": 3,
 }
 """Further signals of planned episodes, world frame: a point in the torso, the object (zero without one), left and right
 sole centre [m]; of each foot the speed at its centre of pressure [m/s], that centre's distance from the edge of the
 sole [m], the downward speed of its lowest corner [m/s], the ground's largest force in any physics step, its vertical
 and its horizontal force in the last one [N]; the size of the net force of thighs, torso and arms on the object, the
-force of partner, impulses and pulls on it [N]; the velocity of its far handle, and the one that the partner intends for
-it [m/s]."""
+force of partner, impulses and pulls on it [N]; the displacement of its far handle in the step [m], and
+the velocity that the partner intends for it [m/s]."""
 JOINT_SIGNALS = ("joint_torque", "joint_saturation")
 """Signals of planned episodes with one value per joint: torque [N·m], whether it is at its limit."""
 ACTION_SIGNAL = "action"
