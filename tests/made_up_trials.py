@@ -48,7 +48,7 @@ def outcome(
 ) -> Outcome:
     """A trial that was survived, with the drawn mass [kg], friction of the ground, rolling resistance [N] and strength
     of the motors."""
-    drawn = {"object_mass": mass, "ground_friction": friction, "rolling_resistance": rolling}
+    drawn = {"object_mass": mass, "ground_friction": friction, "rolling_resistance": rolling, "partner_share": 0.0}
     seconds, values = DT * len(signals), {name: np.array([value]) for name, value in drawn.items()}
     values |= {"motor_strength": np.full(len(robot.joints), strength)}
     values |= {"linkage_effort": np.full(len(robot.linkages), 50.0)}

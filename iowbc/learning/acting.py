@@ -98,5 +98,9 @@ def unfinished_policy(path: Path, key: str, settings: Teacher, mirrors: Mirrors)
         except Damaged:
             continue
         if content is not None:
-            return policy_of(*trained_network(under("policy", load(content)), settings, mirrors))
+            return policy_of(
+                *trained_network(
+                    {**under("policy", (saved := load(content))), **under("average", saved)}, settings, mirrors
+                )
+            )
     raise Damaged(f"{path}: no whole checkpoint of this training")

@@ -56,7 +56,6 @@ class Learner:
         """`mirrors`: of observation and action; `cores`: for network updates; `value_only`: indices of observations
         for the value network only; `device`: torch device of the networks."""
         set_random_seed(seed)
-        env.seed(seed)
         self.settings, self.env, self.device = teacher, env, torch.device(device)
         self._on_cpu = self.device.type == "cpu"
         self.in_parallel = ParallelBatch(teacher.parts if self._on_cpu else 1, cores)

@@ -81,10 +81,10 @@ class Track:
         trace = trace_of(signals, 0, len(seen), self.period)
         deviations = deviations_from_clamped(trace, max(1, round(self.gait_period / self.period)))
         shares = trace.joint_saturation.mean(axis=0)
-        means = deviations.means()
+        means, judged = deviations.means(), self.held_weight > Success().least_weight
         return TrackFigures(
             errors={name: means[name] for name in ERRORS},
-            weight_in_hands=load_metrics(trace, self.held_weight, Success().least_weight)["weight_in_hands"],
+            weight_in_hands=load_metrics(trace, self.held_weight, judged)["weight_in_hands"],
             saturated={name: float(share) for name, share in zip(self.joints, shares, strict=True) if share > 0},
         )
 

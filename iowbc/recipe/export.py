@@ -25,8 +25,8 @@ class Acceptance(Section):
     seed: int = Field(default=2000, ge=0, lt=2**32)
     """Seed of the first trial."""
     weight_in_hands: float = Field(default=0.95, ge=0, le=1)
-    """Fraction of a held object's weight, less the partner's share, that must rest in the hands on average; the rest
-    lies on thighs or torso."""
+    """Fraction of a held object's weight, less all external vertical forces, that must rest in the hands on average;
+    the rest lies on thighs or torso."""
     transport: float = Field(default=0.5, ge=0, le=1)
     """Fraction of the commanded displacement, if any, that robot and object must cover."""
     object_beside: float = Field(default=0.35, gt=0, json_schema_extra=LATER)

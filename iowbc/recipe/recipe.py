@@ -83,6 +83,16 @@ class Recipe(Section):
             if steps < 1 or abs(steps * step - period) > 1e-9:
                 better = f"take {period / max(1, steps):.6g} s"
                 yield f"{section}.timestep", f"{step:g} s does not divide a control period of {period:g} s; {better}"
+        decisions = self.task.control_frequency / self.skill.frequency
+        if decisions < 1.0 or abs(decisions - round(decisions)) > 1e-9:
+            better = f"take {self.task.control_frequency / max(1, round(decisions)):.6g} Hz"
+            text = f"{self.skill.frequency:g} Hz does not divide the control frequency"
+            yield "skill.frequency", f"{text} of {self.task.control_frequency:g} Hz; {better}"
+        if self.rg.height == "com" and self.task.references.height is not None:
+            text = (
+                "compares the pelvis with its commanded height, and rg.height: com commands that of the centre of mass"
+            )
+            yield "task.references.height", text
         yield from scene_name_problems(self)
 
     @field_validator("stages")

@@ -62,9 +62,10 @@ def lean_of(rotation: Array) -> Array:
     return np.arctan2(-rotation[..., 2, 0], rotation[..., 2, 2])
 
 
-def roll_of(rotation: Array) -> Array:
-    """Roll of Rz Ry Rx, positive to the right: atan2(R₂₁, R₂₂) of matrices (..., 3, 3), shape (...) [rad]."""
-    return np.arctan2(rotation[..., 2, 1], rotation[..., 2, 2])
+def side_tilt_of(rotation: Array) -> Array:
+    """Tilt to a side, positive to the right, at any pitch: asin(R₂₁) of matrices (..., 3, 3), shape (...) [rad]. The
+    roll of Rz Ry Rx exceeds it by 1 / cos(pitch), and is undefined at a bow of a right angle."""
+    return np.arcsin(rotation[..., 2, 1].clip(-1.0, 1.0))
 
 
 def matrix(quaternion: Array) -> Array:

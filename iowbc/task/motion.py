@@ -32,7 +32,7 @@ class Motion:
     torso_pitch: Array
     """Torso against gravity, positive leaning forward, (n,) [rad]."""
     torso_roll: Array
-    """(n,) [rad]."""
+    """Tilt of the torso to a side, positive to the right, (n,) [rad]."""
     foot_position: Array
     """Soles relative to the base, (n, 2, 3) [m]."""
     foot_force: Array
@@ -72,7 +72,7 @@ def motion(state: SimulationState, height: Literal["pelvis", "com"] = "pelvis") 
         height=base[:, 2] if height == "pelvis" else state.com_position[:, 2],
         pelvis_tilt=np.arccos(rotation[:, 2, 2].clip(-1.0, 1.0)),
         torso_pitch=rotations.lean_of(state.torso_rotation),
-        torso_roll=rotations.roll_of(state.torso_rotation),
+        torso_roll=rotations.side_tilt_of(state.torso_rotation),
         foot_position=vectors[:, 2:4],
         foot_force=vectors[:, 4:6],
         object_offset=vectors[:, 6],

@@ -66,7 +66,7 @@ def test_what_the_partner_bears_is_not_asked_of_the_hands() -> None:
     grip, partner = signals.grip_force.copy(), signals.partner_force.copy()
     grip[:, [2, 5]], partner[:, 2] = -20.0, 40.0  # 40 N by the hands, 40 N by the partner, of 80 N
     held = replace(signals, grip_force=grip, partner_force=partner, external_force=partner)
-    metrics = load_metrics(held, 80.0, 5.0)
+    metrics = load_metrics(held, 80.0)
     assert metrics["hand_weight_share"] == pytest.approx(0.5)
     assert metrics["partner_weight_share"] == pytest.approx(0.5)
     assert metrics["weight_in_hands"] == pytest.approx(1.0)
@@ -76,7 +76,7 @@ def test_weight_on_the_thighs_is_not_in_the_hands() -> None:
     signals = trace(200)
     grip = signals.grip_force.copy()
     grip[:, [2, 5]] = -10.0
-    assert load_metrics(replace(signals, grip_force=grip), 40.0, 5.0)["weight_in_hands"] == pytest.approx(0.5)
+    assert load_metrics(replace(signals, grip_force=grip), 40.0)["weight_in_hands"] == pytest.approx(0.5)
 
 
 def test_impulses_on_the_object_load_the_hands_beyond_its_weight() -> None:
@@ -85,12 +85,12 @@ def test_impulses_on_the_object_load_the_hands_beyond_its_weight() -> None:
     grip[:, [2, 5]], external[60:70, 2] = -20.0, -70.0
     grip[60:70, [2, 5]] -= 35.0
     held = replace(signals, grip_force=grip, external_force=external)
-    assert load_metrics(held, 40.0, 5.0)["weight_in_hands"] == pytest.approx(1.0)
+    assert load_metrics(held, 40.0)["weight_in_hands"] == pytest.approx(1.0)
 
 
 def test_where_a_weight_rests_that_a_touch_exceeds_is_not_asked() -> None:
-    assert np.isnan(load_metrics(trace(200), 0.5, 5.0)["weight_in_hands"])
+    assert np.isnan(load_metrics(trace(200), 0.5, judged=False)["weight_in_hands"])
 
 
 def test_without_an_object_in_the_hands_there_is_no_share() -> None:
-    assert np.isnan(list(load_metrics(trace(200), 0.0, 5.0).values())).all()
+    assert np.isnan(list(load_metrics(trace(200), 0.0).values())).all()

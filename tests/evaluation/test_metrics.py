@@ -1,13 +1,14 @@
 """The paper's errors on signals whose errors are known."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from made_up_trials import DT, GAIT_STEPS, RECIPE, ROBOT, outcome, script, trace
 
 from iowbc.evaluation.trials.errors import ERRORS, error_norm, moving_average
-from iowbc.evaluation.trials.metrics import jerk, second_difference, trial_metrics
+from iowbc.evaluation.trials.metrics import effort_metrics, jerk, second_difference, trial_metrics
 from iowbc.evaluation.trials.trace import Trace
 from iowbc.robot.rotations import wrapped
 from iowbc.task.commands.script import CommandScript
@@ -98,7 +99,8 @@ def test_energy_is_power_times_time_and_distance_the_path_walked() -> None:
     path[:, 0] = 0.5 * DT * np.arange(len(path))
     metrics = metrics_of(replace(exact, base_position=path))
     assert metrics["energy"] == pytest.approx(100.0 * 400 * DT)
-    assert metrics["distance"] == pytest.approx(0.5 * DT * 399)
+    shortened = GAIT_STEPS / 2  # by averages at both ends
+    assert metrics["distance"] == pytest.approx(0.5 * DT * (399 - shortened), abs=0.01)
 
 
 def test_peak_torque_and_saturation_are_told_by_joint() -> None:
@@ -137,6 +139,21 @@ def test_torque_is_measured_against_the_limit_of_each_joint_and_the_worst_one_co
     assert metrics["torque_rms"] == metrics["torque_rms/hip"]
     weak = metrics_of(replace(trace(), joint_torque=torque), strength=0.5)
     assert weak["torque_rms/hip"] == pytest.approx(0.5), "20 of 40 N·m"
+
+
+def test_joints_of_a_linkage_share_its_limit() -> None:
+    torque = np.tile([15.0, -10.0], (400, 1))
+    linked = SimpleNamespace(**{**vars(ROBOT), "linkages": np.array([[0, 1]])})
+    metrics = effort_metrics(replace(trace(), joint_torque=torque), linked, np.array([50.0, 50.0]))
+    assert metrics["torque_rms/hip"] == metrics["torque_rms/knee"] == pytest.approx(0.5)
+    assert metrics["peak_torque/knee"] == pytest.approx(10.0)
+
+
+def test_swaying_is_not_walking() -> None:
+    sway = np.zeros((400, 3))
+    sway[:, 1] = 0.05 * np.sin(2 * np.pi * np.arange(400) / GAIT_STEPS)
+    sway[:, 0] = np.linspace(0.0, 2.0, 400)
+    assert metrics_of(replace(trace(), base_position=sway))["distance"] == pytest.approx(2.0, rel=0.1)
 
 
 def test_the_raw_velocity_error_is_told_of_the_moving_part_too() -> None:

@@ -28,7 +28,7 @@ def test_euler_angles_come_back() -> None:
     quaternion = rotations.from_euler(roll, pitch, yaw)
     rotation = rotations.matrix(quaternion)
     np.testing.assert_allclose(np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0]), yaw, atol=1e-12)
-    np.testing.assert_allclose(rotations.roll_of(rotation), roll, atol=1e-12)
+    np.testing.assert_allclose(rotations.side_tilt_of(rotation), np.arcsin(np.sin(roll) * np.cos(pitch)), atol=1e-12)
     np.testing.assert_allclose(rotations.lean_of(rotation), np.arctan2(np.tan(pitch), np.cos(roll)), atol=1e-12)
 
 

@@ -31,7 +31,7 @@ PUBLISHED_TO = {
     "wo_rg": "eval",
     "wo_distill": "eval",
     "blind": "export",
-    "compliant_quick": "eval",
+    "compliant_quick": "teacher",
     "compliant_wide": "teacher",
     "compliant_pace": "teacher",
     "compliant_steady": "teacher",

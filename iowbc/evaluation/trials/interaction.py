@@ -11,13 +11,13 @@ SETTLING = 1.0
 """Initial time excluded while the load is taken up [s]."""
 
 
-def load_metrics(trace: Trace, weight: float, least: float) -> dict[str, float]:
+def load_metrics(trace: Trace, weight: float, judged: bool = True) -> dict[str, float]:
     """Fractions of a held object's `weight` [N], means over the trial without its first second; NaN if nothing is held.
 
     `hand_weight_share`: the hands' vertical force over the weight. `partner_weight_share`: the partner's.
     `weight_in_hands`: the hands' part of the load on the robot, which is the weight less all external vertical forces;
-    the rest is borne by contacts of other links. NaN if that load is not above `least` [N], since a touch of the torso
-    would then dominate.
+    the rest is borne by contacts of other links, and more than 1 means that these press the object down. NaN unless
+    `judged`, for loads so small that a touch of the torso would dominate.
     """
     begin = round(SETTLING / trace.dt)
     if not weight > 0 or len(trace) <= begin:
@@ -28,7 +28,7 @@ def load_metrics(trace: Trace, weight: float, least: float) -> dict[str, float]:
     return {
         "hand_weight_share": hands,
         "partner_weight_share": partner,
-        "weight_in_hands": hands / left if left * weight > least else np.nan,
+        "weight_in_hands": hands / left if judged and left > 0.0 else np.nan,
     }
 
 

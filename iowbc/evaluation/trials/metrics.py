@@ -1,7 +1,5 @@
 """Metrics of a trial from its signals."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from iowbc.arrays import Array
@@ -33,11 +31,13 @@ def trial_metrics(recipe: Recipe, robot: Robot, episode: Episode, outcome: Outco
         raise ValueError("a trial without a command sequence or without a single step has no metrics")
     gait, window = task.references.gait, round(task.control_frequency / task.references.gait.frequency)
     kind = getattr(recipe.simulation.scenes, episode.scene).kind
-    mass, friction, rolling = (
-        float(outcome.drawn[name][0]) for name in ("object_mass", "ground_friction", "rolling_resistance")
+    mass, friction, rolling, share = (
+        float(outcome.drawn[name][0])
+        for name in ("object_mass", "ground_friction", "rolling_resistance", "partner_share")
     )
     limits = drawn_effort(robot, *(outcome.drawn[name][None] for name in ("motor_strength", "linkage_effort")))[0]
     held_weight = GRAVITY * mass if kind == "lift" else 0.0
+    judged = held_weight * (1.0 - share) > asked.success.least_weight
     resistance = rolling if kind == "push" else np.inf
     whole = script.at(trace.dt * np.arange(round(script.duration / trace.dt)))
     given = script.at(trace.dt * np.arange(len(trace)))
@@ -46,7 +46,8 @@ def trial_metrics(recipe: Recipe, robot: Robot, episode: Episode, outcome: Outco
     still = errors.deviations_standing_still(whole, task.commands, trace.dt)
     raw = errors.velocity_deviation(trace.system_velocity, given, 1)
     directions, length = commanded_path(whole, errors.start_heading(trace), trace.dt)
-    walked = float(np.sum(np.linalg.norm(np.diff(trace.base_position[:, :2], axis=0), axis=1)))
+    path = errors.moving_average(trace.base_position[:, :2], window)
+    walked = float(np.sum(np.linalg.norm(np.diff(path, axis=0), axis=1)))
     has_object = bool(np.any(trace.object_position))
     still_errors = still.means() | still.means("_moving", wants_to_move(whole, gait))
     return {
@@ -65,25 +66,28 @@ def trial_metrics(recipe: Recipe, robot: Robot, episode: Episode, outcome: Outco
         "distance": walked,
         **foot_metrics(trace, asked.foot_load, walked),
         **ground_metrics(trace, asked.foot_load, friction),
-        **load_metrics(trace, held_weight, asked.success.least_weight),
+        **load_metrics(trace, held_weight, judged),
         **interaction_metrics(trace, window),
         **push_metrics(trace, directions, window, friction, resistance, asked.success.push_force),
         **impedance_metrics(trace, episode.pull),
-        **effort_metrics(trace, robot.joints, limits),
+        **effort_metrics(trace, robot, limits),
     }
 
 
-def effort_metrics(trace: Trace, joints: Sequence[str], limits: Array) -> dict[str, float]:
+def effort_metrics(trace: Trace, robot: Robot, limits: Array) -> dict[str, float]:
     """Effort in the trial: torques, energy, forces at hands and partner, jerk of torso and object, and the root mean
     square of the action's second difference over time and support joints [rad].
 
     limits: torque limits drawn for the trial's motors and linkages, (joints,) [N·m].
 
-    `torque_rms/<joint>`: RMS torque of a joint as a fraction of its limit; `torque_rms`: the largest of these.
+    `torque_rms/<joint>`: RMS torque of a joint, or of both joints of its linkage |τ_a| + |τ_b|, as a fraction of its
+    limit; `torque_rms`: the largest of these.
     """
     grips = np.linalg.norm(trace.grip_force.reshape(-1, 2, 3), axis=2)
     peak, saturated = np.abs(trace.joint_torque).max(axis=0), trace.joint_saturation.mean(axis=0)
-    effort = np.sqrt(np.mean(np.square(trace.joint_torque), axis=0)) / limits
+    driven, pairs = np.abs(trace.joint_torque), robot.linkages
+    driven[:, pairs] = driven[:, pairs].sum(axis=2, keepdims=True)
+    effort = np.sqrt(np.mean(np.square(driven), axis=0)) / limits
     return {
         "saturation": float(np.mean(trace.saturation)),
         "saturation_peak": float(np.max(trace.saturation)),
@@ -99,7 +103,7 @@ def effort_metrics(trace: Trace, joints: Sequence[str], limits: Array) -> dict[s
         **{
             f"{name}/{joint}": float(value)
             for name, values in (("peak_torque", peak), ("saturated", saturated), ("torque_rms", effort))
-            for joint, value in zip(joints, values, strict=True)
+            for joint, value in zip(robot.joints, values, strict=True)
         },
     }
 

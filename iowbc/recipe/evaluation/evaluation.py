@@ -48,11 +48,11 @@ class Success(Section):
     transport: float = Field(default=0.5, ge=0, le=1)
     """Fraction of the commanded displacement that robot and object must cover; a stationary robot covers none."""
     weight_in_hands: float = Field(default=0.95, ge=0, le=1)
-    """Fraction of a held object's weight, less the partner's share, that must rest in the hands on average; the rest
-    lies on thighs or torso."""
+    """Fraction of a held object's weight, less all external vertical forces, that must rest in the hands on average;
+    the rest lies on thighs or torso."""
     least_weight: float = Field(default=5.0, ge=0)
-    """Weight on the robot below which `weight_in_hands` is not evaluated [N]. A 0.05 kg box weighs a tenth of this, and
-    a touch of the torso is several times its weight."""
+    """Weight, less the partner's nominal share, below which `weight_in_hands` is not evaluated [N]. A 0.05 kg box
+    weighs a tenth of this, and a touch of the torso is several times its weight."""
     object_beside: float = Field(default=0.35, gt=0, json_schema_extra=LATER)
     """Lateral distance from the robot beyond which a pushed object counts as lost [m]: the midpoint of the hands is
     then past the edge of a 0.6 m wide crate. For a held object see `object_distance`."""

@@ -12,6 +12,7 @@ from iowbc.recipe.section import (
     LATER,
     ArtifactName,
     Ascending,
+    Positive,
     PositiveRange,
     RecipeFile,
     Section,
@@ -38,7 +39,7 @@ class SkillLearning(PPO):
     """Number of parallel games."""
     rollout: int = Field(default=100, ge=2, le=10_000)
     """Decisions of each game between two updates. Every rollout restarts all games, so that a resumed training needs no
-    state of the simulation; an episode should therefore fit into one."""
+    state of the simulation: what comes later in an episode than a rollout is long is not trained."""
     imitation_steps: int = Field(default=100_000, ge=0, le=10**12)
     """Initial decisions in which the robot learns by imitation instead of reward: it acts, and imitates the actions of
     a robot that knows the path (DAgger), while the value network is trained. With the reward only, 76,000 decisions
@@ -158,7 +159,7 @@ class GameReward(Section):
 class RobotAgent(Section):
     """Nominal command of the robot, and limits of the action that modifies it."""
 
-    velocity: tuple[float, float] = (0.25, 0.15)
+    velocity: tuple[Positive, Positive] = (0.25, 0.15)
     """Largest change of v_x and v_y by the action [m/s]."""
     yaw_rate: float = Field(default=0.25, gt=0.0)
     """Largest change of the yaw rate by the action [rad/s]."""
@@ -218,7 +219,7 @@ class PathFollowing(Section):
     vertical: float = Field(default=1.0, ge=0.0)
     """Vertical velocity of the handle per metre of the object's height error [1/s]."""
     ahead: float = Field(default=0.3, ge=0.0)
-    """Look-ahead distance for the path's heading and height [m]; a second of walking."""
+    """Look-ahead distance for the path's height [m]; a second of walking."""
     waypoints: tuple[float, float] = (0.5, 1.0)
     """Distances ahead of the next two waypoints that agents observe [m]."""
 

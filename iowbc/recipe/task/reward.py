@@ -42,7 +42,7 @@ class Synchronisation(Section):
     torso_pitch: Kernel = Kernel(weight=1.0, width=0.2)
     """Torso pitch error [rad]."""
     torso_roll: float = -2.0
-    """Weight of the torso's roll squared [rad²]."""
+    """Weight of the squared tilt of the torso to a side [rad²]."""
     filter_time: float = Field(default=0.2, gt=0.0)
     """Time constant of the filter on velocity and yaw rate [s]; the raw yaw rate is mostly exploration noise."""
 

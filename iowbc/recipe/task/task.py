@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field
 
 from iowbc.recipe.beside import CustomFunction
-from iowbc.recipe.section import LATER, CustomName, NamedEntries, Section
+from iowbc.recipe.section import LATER, CustomName, NamedEntries, PositiveRange, Section
 from iowbc.recipe.task.commands import Commands
 from iowbc.recipe.task.curriculum import Curriculum
 from iowbc.recipe.task.joint_references import References
@@ -49,7 +49,7 @@ class Termination(Section):
     pelvis_tilt: float = Field(default=1.3, gt=0.0)
     """Tilt of the pelvis beyond which the robot has fallen [rad]; large, since deep torso pitch tilts it too."""
     torso_roll: float = Field(default=0.8, gt=0.0)
-    """Torso roll beyond which the robot has fallen [rad]."""
+    """Tilt of the torso to a side, at any pitch, beyond which the robot has fallen [rad]."""
     torso_pitch_error: float = Field(default=0.9, gt=0.0)
     """Torso pitch error beyond which the robot has fallen [rad]."""
     lag: float | None = Field(default=None, gt=0.0)
@@ -100,7 +100,7 @@ class Task(Section):
 
     control_frequency: float = Field(default=50.0, gt=0.0, le=500.0)
     """Rate at which the policy acts [Hz]; must divide the physics rate."""
-    episode_duration: tuple[float, float] = (10.0, 20.0)
+    episode_duration: PositiveRange = (10.0, 20.0)
     """Range of the random time limit of an episode [s]; a spread desynchronizes the environments."""
     scenes: SceneShares = SceneShares()
     """Scenes of the environments."""
