@@ -12,6 +12,7 @@ from iowbc.commands import options
 from iowbc.errors import UsageError
 from iowbc.files import file_digest
 from iowbc.pipeline.store.digests import data_digest
+from iowbc.pipeline.store.runs import require_writable
 from iowbc.processes import available_cores
 from iowbc.recipe.reading.loading import load_recipe, recipe_file
 from iowbc.recipe.recipe import Recipe
@@ -74,6 +75,7 @@ def carry(
         raise UsageError(f"--out {out}: a page is a Markdown file; give a name that ends in .md")
     if engine == "both" and drake is None:
         raise UsageError(f"--engine both: Drake is {NO_DRAKE}, or give --engine mujoco")
+    require_writable(out.parent, "--out")
     digest = policy_digest(policy_path(policy))
     values: dict[str, object] = {
         "adapter": "own" if own else adapter,

@@ -9,7 +9,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from iowbc.commands import options
-from iowbc.commands.lookup import named
+from iowbc.commands.lookup import named, require_no_study
 from iowbc.commands.printed import hanging, print_json, stdout_console, tell
 from iowbc.errors import UsageError, shown
 from iowbc.pipeline.code import changed_code
@@ -63,6 +63,7 @@ def _either(store: Store, word: str) -> Run:
     except UsageError:
         if not there:
             raise
+        require_no_study(word)
         found, as_file = Run(word, {}), True
     return replace(found, recipe=load_recipe(file).recipe.model_dump(mode="json")) if as_file else found
 

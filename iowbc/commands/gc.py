@@ -2,9 +2,9 @@
 
 import shutil
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich.filesize import decimal
@@ -14,10 +14,11 @@ from iowbc.commands.lookup import known_recipes, last_used
 from iowbc.commands.printed import shown_path, stdout_console, tell
 from iowbc.errors import UsageError, require_known
 from iowbc.files import OLD
+from iowbc.pipeline.store.artifact import INGREDIENTS, Artifact
 from iowbc.pipeline.store.last_used import ever_used, record_path, remove_dangling
 from iowbc.pipeline.store.locks import holder
 from iowbc.pipeline.store.publishing import PUBLISHING
-from iowbc.pipeline.store.runs import Runs, require_writable_runs
+from iowbc.pipeline.store.runs import Runs, read_json, require_writable_runs
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.store.workspace import unfinished
 from iowbc.pipeline.tracking.journal import Journal, sent_path, unsent
@@ -83,7 +84,10 @@ def _to_remove(
     for recipe in recipes:
         require_known(recipe, "recipe that has run", known)
     own = [artifact for artifact in store.artifacts() if not artifact.published]
-    free = [artifact for artifact in own if not holder(runs, artifact.manifest.key)]
+    attempts = [read_json(folder / INGREDIENTS) for folder, _ in unfinished(runs) if holder(runs, folder.name)]
+    free = [
+        one for one in own if not holder(runs, one.manifest.key) and not any(_reads(each, one) for each in attempts)
+    ]
     if unused:
         last = {artifact.manifest.key for name in known for artifact in last_used(store, name).values()}
         limit = time.time() - older_than * DAY if older_than else 0.0
@@ -97,8 +101,8 @@ def _to_remove(
             if not restorable and not holder(runs, key) and not holder(runs, PUBLISHING):
                 yield path
     others = {key for name in known if name not in recipes for key in ever_used(runs, name)}
-    read = [one.ingredients.get("inputs", {}) for one in own if one.manifest.key in others]
-    borrowed = {digest for inputs in read for name, digest in inputs.items() if name not in STAGES}
+    inputs = [one.ingredients.get("inputs", {}) for one in own if one.manifest.key in others]
+    borrowed = {digest for each in inputs for name, digest in each.items() if name not in STAGES}
     others |= {one.manifest.key for one in own if one.manifest.digest in borrowed}
     for recipe in recipes:
         keys = ever_used(runs, recipe).keys() - others
@@ -112,3 +116,10 @@ def _to_remove(
                     yield from (one for one in (path, sent_path(path)) if one.exists())
     if damaged:
         yield from runs.damaged.glob("*")
+
+
+def _reads(attempt: Mapping[str, Any], artifact: Artifact) -> bool:
+    """True if an attempt with these ingredients reads an artifact, from its own recipe or from that of another one."""
+    stage, digest = artifact.manifest.stage, artifact.manifest.digest
+    inputs = attempt.get("inputs", {})
+    return inputs.get(stage) == digest or digest in [inputs[name] for name in inputs if name not in STAGES]

@@ -46,6 +46,8 @@ CHECKPOINT = Path("scratch", "training.checkpoint")
 def named(store: Store, word: str) -> Run:
     """The meaning of a recipe's name or file, `RECIPE/STAGE`, or the first characters of a key. Raises `UsageError`."""
     recipes, published = finished_recipes(store), _published(store)
+    if word not in recipes:
+        require_no_study(word)
     if word in recipes or Path(word).suffix in SUFFIXES:
         return _recipe(store, word, _name_in(word), published)
     head, slash, stage = word.rpartition("/")
@@ -205,6 +207,12 @@ def _recorded(file: Path, key: str) -> list[str]:
 def members_of(word: str) -> tuple[str, ...]:
     """Names of the recipes that a study names; of anything else none. Raises `RecipeError`."""
     return tuple(one.recipe.name for one in load_study(word)) if os.path.isfile(recipe_file(word)) else ()
+
+
+def require_no_study(word: str) -> None:
+    """Raises `UsageError` for a study, which names several recipes."""
+    if members := members_of(word):
+        raise UsageError(f"{word} is a study; name one of its recipes ({', '.join(members)}), or compare them all")
 
 
 def film_of(runs: Runs, words: Sequence[str]) -> Path | None:

@@ -1,5 +1,6 @@
 """`iowbc plan`: stages that would run, the reasons, and the time, for a recipe, a study or a sweep."""
 
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -85,6 +86,8 @@ def planned(planners: Sequence[Planner]) -> Planned:
     found: dict[str, list[PlannedStage]] = {}
     for planner in planners:
         name = planner.loaded.recipe.name
+        if name in found:  # an origin of its own, with other values
+            name = shlex.join([name, *(word for value in planner.loaded.overrides for word in ("--set", value))])
         identities: dict[str, str] = {}
         own = found.setdefault(name, [])
         for step in planner.plan():

@@ -10,7 +10,7 @@ import time
 import traceback
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import IO
@@ -163,5 +163,5 @@ def _run(task: PointRun, parent: int, saying: Connection) -> None:
         os.dup2(log, descriptor)
     os.close(log)
     ending = task.carried_out(sys.stdout)
-    saying.send(ending)
+    saying.send(replace(ending, artifacts={}))  # a pipe holds 64 KiB, and nobody reads before this process ends
     sys.exit(ending.code)

@@ -38,9 +38,13 @@ def publish(
     without = without or []
     found = planners(request)
     steps = [step for planner in found for step in planner.plan()]
-    missing = [step.stage.name for step in steps if not step.cached]
-    if missing:
-        raise UsageError(f"{', '.join(missing)}: not finished for this recipe; to finish: {request.command()}")
+    lacking = [
+        f"{planner.loaded.recipe.name} ({', '.join(missing)})"
+        for planner in found
+        if (missing := [step.stage.name for step in planner.plan() if not step.cached])
+    ]
+    if lacking:
+        raise UsageError(f"not finished: {', '.join(lacking)}; to finish: {request.command()}")
     require_writable_runs(request.runs)
     notes = {step.key: step.notes for step in steps}
     chains = [one for planner in found for one in planner.chain()]

@@ -58,8 +58,9 @@ def robot(
     from iowbc.onboard.dds import DdsBus
     from iowbc.onboard.log import LogWriter, export_digest
     from iowbc.onboard.machine import Machine
-    from iowbc.onboard.operators import Keyboard, OperatorWithPoses, Ranges, Udp, object_poses, operator, single_keys
+    from iowbc.onboard.operators import Keyboard, OperatorWithPoses, Udp, object_poses, operator, single_keys
     from iowbc.onboard.process import LockStep, MonotonicClock, drive, enable_realtime, listen
+    from iowbc.onboard.ranges import Ranges
 
     console = stdout_console()
     for name in waive or ():
@@ -90,16 +91,17 @@ def robot(
             "scene": scene,
             "limits": LIMITS.model_dump_json(),
         }
-        writer = None if log is None else stack.enter_context(LogWriter(log, about))
         if isinstance(source, Keyboard):
             stack.enter_context(single_keys())
+        writer = None if log is None else stack.enter_context(LogWriter(log, about))
         for port in (source, poses):
             if isinstance(port, Udp):
                 stack.callback(port.close)
                 port.discard()
         source.wanted(0.0, None)  # discard keys from before the robot was ready
         pace = "in step with the simulated robot" if lockstep else enable_realtime()
-        tell(console, f"{pace}; zero torque; commands from {commands}; Ctrl+C damps and ends")
+        origin = f"udp:{source.port}" if isinstance(source, Udp) else commands
+        tell(console, f"{pace}; zero torque; commands from {origin}; Ctrl+C damps and ends")
         clock: Clock = LockStep() if lockstep else MonotonicClock()
         times = drive(
             bus,
@@ -164,7 +166,8 @@ def robot_sim(
         options.require_free(page)
     from iowbc.evaluation.exported import exported_world
     from iowbc.onboard.dds import DdsBus
-    from iowbc.onboard.operators import Ranges, pose_port
+    from iowbc.onboard.operators import pose_port
+    from iowbc.onboard.ranges import Ranges
     from iowbc.twin.process import serve
     from iowbc.twin.robot import Twin
     from iowbc.twin.support import Support

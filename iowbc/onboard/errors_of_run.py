@@ -12,8 +12,8 @@ import numpy as np
 from iowbc.arrays import Array
 from iowbc.control.command import HEIGHT, PITCH, YAW_RATE
 from iowbc.errors import UsageError
-from iowbc.onboard.log import read_cycles
-from iowbc.onboard.machine import FREQUENCY
+from iowbc.onboard.log import read_cycles, read_states
+from iowbc.onboard.machine import FREQUENCY, State
 from iowbc.onboard.sensors import Sensors
 from iowbc.robot import rotations
 from iowbc.robot.description import Robot
@@ -21,7 +21,7 @@ from iowbc.robot.description import Robot
 
 @dataclass(frozen=True)
 class LoggedRun:
-    """Motion of a robot with full position gains, at the rate of the policy; first axis: T control steps."""
+    """Motion of a robot in state run, at the rate of the policy; first axis: T control steps."""
 
     time: Array
     """Time since the log's beginning, (T,) [s]."""
@@ -58,19 +58,21 @@ class LoggedRun:
 
 PAUSE = 0.5
 """Time between two rows after which another run begins [s]."""
+HALF_CYCLE = 0.5 / FREQUENCY
 UNITS = {"E_v": "m/s", "E_ψ": "rad", "E_α": "rad", "E_h": "m"}
 
 
 def read_run(path: Path, robot: Robot, control_frequency: float, gait_frequency: float) -> LoggedRun:
-    """Part of a log with full position gains (Run, settled Stand). Raises UsageError without one, Damaged for another
-    file."""
+    """Part of a log in state run. Raises UsageError without one, Damaged for another file."""
     sensors, every = Sensors(len(robot.joints)), round(FREQUENCY / control_frequency)
-    full, rows, soles, begin = 0.99 * robot.kp, [], [], None
-    for number, (given, command) in enumerate(read_cycles(path)):
+    rows, soles, begin = [], [], None
+    events = list(read_states(path))
+    times = [time for time, _ in events]
+    for number, (given, _) in enumerate(read_cycles(path)):
         begin = given.now if begin is None else begin
         sensors.take(given.states, given.now)
-        stiff = (command["motor_cmd"]["kp"][: len(robot.joints)] >= full).all()
-        if number % every or not stiff or sensors.posture is None:
+        event = np.searchsorted(times, given.now + HALF_CYCLE) - 1
+        if number % every or event < 0 or events[event][1] is not State.RUN or sensors.posture is None:
             continue
         now, wanted = sensors.posture, given.wanted
         angles = dict(zip(robot.joints, now.position, strict=True))

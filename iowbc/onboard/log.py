@@ -111,12 +111,13 @@ def read_about(path: Path) -> dict[str, str]:
     """Metadata of a log of `iowbc robot`. Raises UsageError for a missing file, Damaged for another one."""
     with _opened(path) as file:
         try:
-            about = [entry.metadata for entry in NonSeekingReader(file).iter_metadata() if entry.name == ABOUT]
+            named = (entry.metadata for entry in NonSeekingReader(file).iter_metadata() if entry.name == ABOUT)
+            about = next(named, None)  # at the beginning, so that a cut file has it
         except Exception as error:
-            raise Damaged(f"{path}: cannot be read as MCAP: {error}") from error
-    if not about:
+            raise Damaged(f"{path}: cannot be read as MCAP: {type(error).__name__} {error}") from error
+    if about is None:
         raise Damaged(f"{path}: no log of `iowbc robot`")
-    return dict(about[0])
+    return dict(about)
 
 
 def read_messages(path: Path) -> Iterator[tuple[str, float, bytes]]:
@@ -133,6 +134,13 @@ def read_messages(path: Path) -> Iterator[tuple[str, float, bytes]]:
         except Exception as error:  # type depends on where the file was cut
             if not found:
                 raise Damaged(f"{path}: {type(error).__name__}: {error}") from error
+
+
+def read_states(path: Path) -> Iterator[tuple[float, State]]:
+    """Time [s] and state at each event, in order. Raises Damaged and UsageError."""
+    for topic, time, data in read_messages(path):
+        if topic == "event":
+            yield time, State(json.loads(data)["state"])
 
 
 def read_cycles(path: Path) -> Iterator[tuple[CycleInputs, Record]]:

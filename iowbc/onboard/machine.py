@@ -18,6 +18,7 @@ from iowbc.deploy.controller import Controller
 from iowbc.onboard import checks, messages
 from iowbc.onboard.checks import LIMITS, SafetyLimits
 from iowbc.onboard.messages import Record
+from iowbc.onboard.ranges import Ranges
 from iowbc.onboard.sensors import Sensors
 
 FREQUENCY = 500.0
@@ -84,7 +85,7 @@ class Machine:
         self._contract = contract = controller.contract
         self._joints = len(contract.joints)
         self._observed = quantities(of_object=True).keys() & {port.name for port in contract.inputs}
-        self.sensors = Sensors(self._joints)
+        self.sensors, self._ranges = Sensors(self._joints), Ranges(contract)
         self.state = State.ZERO_TORQUE
         self.events: list[str] = []
         """Events of the last cycle with their reasons: states entered, requests refused, and warnings."""
@@ -105,6 +106,7 @@ class Machine:
     def turn(self, given: CycleInputs) -> Record:
         """Low-level command of this cycle."""
         self.events = []
+        given = replace(given, wanted=replace(given.wanted, command=self._ranges.clipped(given.wanted.command)))
         self.sensors.take(given.states, given.now)
         self._charge = self._charge if given.charge is None else given.charge
         self._foreign = given.now if given.others else self._foreign
@@ -172,6 +174,8 @@ class Machine:
             return f"the pelvis leans by {now.tilt:.2f} rad, more than {limits.standing_tilt:g}"
         if wanted is State.STAND and (speed := np.abs(now.velocity).max()) > limits.standing_speed:
             return f"a joint moves at {speed:.1f} rad/s, more than {limits.standing_speed:g}"
+        if wanted is State.STAND:
+            return self._stale_input(given, pose=False)
         if wanted is State.RUN:
             if given.now - self._entered < limits.ramp:
                 return "the standing posture is not reached yet"
@@ -187,6 +191,8 @@ class Machine:
         wanted, limits = given.wanted, self.limits
         if (age := given.now - wanted.at) > limits.command_age:
             return f"stale command: nothing new for {age:.2f} s"
+        if not np.isfinite(wanted.command).all():
+            return "the command is not finite"
         if not pose:
             return None
         if missing := self._observed - wanted.seen.keys():

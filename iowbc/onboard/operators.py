@@ -14,13 +14,12 @@ from typing import Any, Protocol
 import numpy as np
 from pydantic import Field
 
-from iowbc.arrays import Array
-from iowbc.control.command import COMMAND, HEIGHT, OFFSET, PITCH, YAW_RATE, nominal_command
-from iowbc.control.sensors import quantities
+from iowbc.control.command import HEIGHT, OFFSET, PITCH, YAW_RATE
 from iowbc.deploy.contract import Contract
 from iowbc.errors import UsageError
 from iowbc.onboard.machine import OperatorRequest, State
 from iowbc.onboard.messages import Record
+from iowbc.onboard.ranges import Ranges
 from iowbc.recipe.section import Section
 
 BUTTONS = ("R1", "L1", "start", "select", "R2", "L2", "F1", "F2", "A", "B", "X", "Y", "up", "right", "down", "left")
@@ -43,6 +42,8 @@ BACKLOG = 10_000
 UNATTENDED = 5.0
 """Longest time without a key for which the keyboard's velocity is kept [s]: a connection that froze sends none."""
 ESCAPE = "\x1b"
+SEQUENCE = 0.5
+"""Longest time between the characters of an escape sequence [s]."""
 
 
 class Operator(Protocol):
@@ -50,28 +51,6 @@ class Operator(Protocol):
 
     def wanted(self, now: float, state: Record | None) -> OperatorRequest:
         """Command and request at `now` [s]; `state`: the robot's newest state."""
-
-
-class Ranges:
-    """Command ranges of training, and the command to stand."""
-
-    def __init__(self, contract: Contract) -> None:
-        known = contract.commands
-        self.velocity = np.array([known.velocity_x, known.velocity_y, known.yaw_rate]).T
-        self._low, self._high = np.full(len(COMMAND), -1.0), np.ones(len(COMMAND))
-        self._low[:HEIGHT], self._high[:HEIGHT] = self.velocity
-        for place, (low, high) in ((HEIGHT, known.height), (PITCH, known.deep_pitch)):
-            self._low[place], self._high[place] = low, high
-        self._high[OFFSET] = np.tile(np.add(known.common_offset, known.single_offset), 2)
-        self._low[OFFSET] = -self._high[OFFSET]
-        self.standing = nominal_command(known)
-        ports, of_object = contract.inputs, quantities(of_object=True)
-        self.seen = {port.name: port.shape[0] for port in ports if port.name in of_object}
-        """Sizes of the object's measurements that the controller observes, by name."""
-
-    def clipped(self, command: Array) -> Array:
-        """The command within the ranges, (11,)."""
-        return np.clip(command, self._low, self._high)
 
 
 class Remote:
@@ -119,7 +98,13 @@ class Keyboard:
 
     def wanted(self, now: float, state: Record | None) -> OperatorRequest:
         request, keys = None, self._keys()
-        for key in filter(self._single, keys or ""):
+        if now - self._pressed > SEQUENCE:
+            self._sequence = ""
+        for key in keys or "":
+            if self._sequence == ESCAPE and key not in "[O":
+                request = State.DAMPING
+            if not self._single(key):
+                continue
             request = State.DAMPING if request is State.DAMPING else KEYS.get(key, request)
             if key in STEPS:
                 place, step = STEPS[key]
@@ -190,7 +175,8 @@ class Datagram(Section):
 
 
 class Udp:
-    """JSON datagrams at a local port; see `Datagram`. Datagrams that cannot be parsed are ignored."""
+    """JSON datagrams at a local port; see `Datagram`. Of datagrams that cannot be parsed only a request to damp counts;
+    those with `seen` alone are no commands."""
 
     def __init__(self, ranges: Ranges, port: int) -> None:
         self.ranges = ranges
@@ -209,7 +195,10 @@ class Udp:
             for _ in range(MOST_DATAGRAMS):
                 data = self._socket.recv(LARGEST_DATAGRAM)
                 with contextlib.suppress(ValueError, RecursionError):
-                    given = Datagram.model_validate(json.loads(data))
+                    content = json.loads(data)
+                    if isinstance(content, dict) and content.get("request") == State.DAMPING:
+                        request = State.DAMPING  # whatever else is wrong
+                    given = Datagram.model_validate(content)
                     request = State.DAMPING if request is State.DAMPING else given.request or request
                     self._wanted = self._given(given, now)
         last = self._wanted
@@ -234,7 +223,10 @@ class Udp:
         sizes = {name: len(values) for name, values in given.seen.items()}
         known = self.ranges.seen.items() & sizes.items()  # a measurement of another size is ignored
         seen: dict[str, Any] = {name: np.array([given.seen[name]]) for name, _ in known}
-        return OperatorRequest(command, now, None, seen or self._wanted.seen, now if seen else self._wanted.seen_at)
+        seen_at = now if seen else self._wanted.seen_at
+        if given.model_fields_set == {"seen"}:  # a pose is no command
+            return replace(self._wanted, seen=seen or self._wanted.seen, seen_at=seen_at)
+        return OperatorRequest(command, now, None, seen or self._wanted.seen, seen_at)
 
 
 @dataclass(frozen=True)

@@ -143,8 +143,14 @@ class NamedEntries(Section):
 
     @property
     def own(self) -> tuple[str, ...]:
-        """Names of the custom entries."""
+        """Names of the custom entries, alphabetically."""
         return tuple(self.model_extra or ())
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        """Sorts the custom entries: keys do not know their order in the file, so it must not decide anything."""
+        object.__setattr__(self, "__pydantic_extra__", dict(sorted((self.model_extra or {}).items())))
+        return self
 
     def problems(self) -> Iterator[tuple[str, str]]:
         for name in self.own:

@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from pydantic import Field, JsonValue, ValidationError
 
@@ -148,10 +148,10 @@ def load_sweep(
         if len(values) > 1:
             grid[path.strip()] = values
         else:
-            fixed.append(setting)
+            fixed.append(setting if values == listed else f"{path}={written(values[0])}")
     set_here = {*grid, *(setting.partition("=")[0].strip() for setting in fixed)}
     drawn = described.draws.points() if described.draws is not None else [{}]
-    drawn = [{path: value for path, value in point.items() if path not in set_here} for point in drawn]
+    drawn = _each_once([{path: value for path, value in point.items() if path not in set_here} for point in drawn])
     axes = (*grid, *drawn[0])
     if axes or not load_study(word):
         _require_axes(axes, file)
@@ -217,7 +217,11 @@ def _expanded(values: Sequence[JsonValue], place: str) -> list[JsonValue]:
             text = f"{value}: should read SMALLER..LARGER, of {MOST_VALUES:,} integers at most"
             raise RecipeError([Problem(place, text)])
         found += range(first, last + 1)
-    return [value for place_, value in enumerate(found) if value not in found[:place_]]
+    return _each_once(found)
+
+
+def _each_once(values: Sequence[Any]) -> list[Any]:
+    return [value for place, value in enumerate(values) if value not in values[:place]]
 
 
 def _require_axes(axes: Sequence[str], file: Path | None) -> None:

@@ -44,11 +44,11 @@ class Group:
     @property
     def seeds(self) -> tuple[str, ...]:
         """Seed of each run's training; where seeds are equal, the labels of the runs."""
-        own = [run.recipe.get("teacher", {}).get("seed") for run in self.runs]
-        seeds = [
-            str(run.recipe.get("seed", 0) if seed is None else seed) for run, seed in zip(self.runs, own, strict=True)
-        ]
-        return tuple(seeds if len({*seeds}) == len(seeds) else (run.label for run in self.runs))
+        for own in (("skill", "learning", "seed"), ("teacher", "seed")):
+            seeds = [str(_seed(run.recipe, own)) for run in self.runs]
+            if len({*seeds}) == len(seeds):
+                return tuple(seeds)
+        return tuple(run.label for run in self.runs)
 
     def values(self, stage: str, metric: str) -> NDArray[np.float64]:
         """A stage's metric in each run that has it."""
@@ -114,10 +114,28 @@ def _of_one_variant(first: Run, second: Run) -> bool:
     return "eval" in shared and all(decided[0]) and decided[0] == decided[1] and labels[0] == labels[1]
 
 
+def _seed(recipe: Mapping[str, Any], path: Sequence[str]) -> int:
+    """The seed at a path, or the recipe's own where that is empty."""
+    value: Any = recipe
+    for name in path:
+        value = value.get(name) if isinstance(value, Mapping) else None
+    return int(recipe.get("seed", 0) if value is None else value)
+
+
 def _seedless(recipe: Mapping[str, Any]) -> dict[str, Any]:
     """A recipe without its seeds, name, description and execution."""
     found = {name: value for name, value in recipe.items() if name not in NAMING and name not in SEEDS}
-    for name, value in found.items():
-        if f"{name}.seed" in SEEDS and isinstance(value, Mapping):
-            found[name] = {key: item for key, item in value.items() if key != "seed"}
+    for path in SEEDS:
+        head, *rest = path.split(".")
+        if rest and isinstance(found.get(head), Mapping):
+            found[head] = _without(found[head], rest)
     return found
+
+
+def _without(section: Mapping[str, Any], path: Sequence[str]) -> dict[str, Any]:
+    """A section without the value at a path."""
+    head, *rest = path
+    if not rest:
+        return {name: value for name, value in section.items() if name != head}
+    below = section.get(head)
+    return {**section, head: _without(below, rest)} if isinstance(below, Mapping) else dict(section)

@@ -17,8 +17,8 @@ from iowbc.deploy.exported_folder import exported_folder
 from iowbc.evaluation.exported import exported_world
 from iowbc.onboard.machine import CycleInputs, Machine, OperatorRequest, State
 from iowbc.onboard.messages import Record
-from iowbc.onboard.operators import Ranges
 from iowbc.onboard.process import PERIOD
+from iowbc.onboard.ranges import Ranges
 from iowbc.twin.robot import Twin
 from iowbc.twin.support import Support
 

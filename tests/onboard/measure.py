@@ -22,8 +22,9 @@ from iowbc.onboard.dds import DdsBus
 from iowbc.onboard.log import LogWriter
 from iowbc.onboard.machine import Machine, OperatorRequest, State
 from iowbc.onboard.messages import Record
-from iowbc.onboard.operators import Operator, OperatorWithPoses, Ranges, Udp
+from iowbc.onboard.operators import Operator, OperatorWithPoses, Udp
 from iowbc.onboard.process import Clock, LockStep, MonotonicClock, drive, enable_realtime, listen
+from iowbc.onboard.ranges import Ranges
 
 TASKS = {
     "stand": ("free", (), (0.0, 0.0, 0.0)),

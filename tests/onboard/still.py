@@ -10,8 +10,8 @@ from iowbc.deploy.controller import Controller
 from iowbc.onboard.checks import SafetyLimits
 from iowbc.onboard.machine import CycleInputs, Machine, OperatorRequest, State
 from iowbc.onboard.messages import Record
-from iowbc.onboard.operators import Ranges
 from iowbc.onboard.process import PERIOD
+from iowbc.onboard.ranges import Ranges
 from iowbc.twin.robot import low_state
 
 RAMP = 0.1

@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 from still import Still
 
-from iowbc.control.command import HEIGHT, PITCH
+from iowbc.control.command import COMMAND, HEIGHT, PITCH
 from iowbc.deploy.controller import Controller
 from iowbc.onboard.machine import State
 from iowbc.onboard.messages import Record
 from iowbc.onboard.process import PERIOD
+from iowbc.onboard.ranges import Ranges
 
 
 def gains(command: Record) -> tuple[float, float]:
@@ -259,3 +260,21 @@ def test_the_heading_goes_on_past_half_a_turn(still: Still) -> None:
         state["imu_state"]["quaternion"] = np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)
         still.turn(states=(state,))
     assert still.machine.sensors.heading == pytest.approx(4.0, abs=1e-5)
+
+
+@pytest.mark.parametrize("state", [State.STAND, State.RUN])
+def test_a_command_that_is_not_finite_damps_and_is_refused(still: Still, state: State) -> None:
+    still.until(state)
+    still.standing = np.where(np.arange(len(COMMAND)) == HEIGHT, np.nan, still.standing)
+    still.turn()
+    assert still.machine.state is State.DAMPING
+    assert "the command is not finite" in still.machine.events[0]
+    still.turn(State.STAND)
+    assert still.machine.state is State.DAMPING
+
+
+def test_commands_beyond_the_ranges_of_training_are_clipped(still: Still) -> None:
+    still.standing[HEIGHT] = 5.0
+    goal = still.until(State.STAND)["motor_cmd"]["q"][: len(still.posture)]
+    clipped = Ranges(still.controller.contract).clipped(still.standing)
+    assert goal == pytest.approx(still.controller.settled_posture(clipped)[0], abs=1e-6)

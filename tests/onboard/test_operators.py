@@ -24,12 +24,12 @@ from iowbc.onboard.operators import (
     UNATTENDED,
     Keyboard,
     OperatorWithPoses,
-    Ranges,
     Remote,
     Udp,
     object_poses,
     operator,
 )
+from iowbc.onboard.ranges import Ranges
 
 
 @pytest.fixture
@@ -107,6 +107,20 @@ def test_escape_damps_and_a_sequence_that_is_cut_requests_nothing_else(ranges: R
     assert pressed(keyboard, terminal, b"3") is State.RUN
 
 
+def test_escape_damps_whatever_key_comes_with_it(ranges: Ranges, terminal: int) -> None:
+    keyboard = Keyboard(ranges)
+    for keys in (b"\x1b2", b"\x1b3", b"\x1bx", b"3\x1bi"):
+        assert pressed(keyboard, terminal, keys) is State.DAMPING
+
+
+def test_a_key_after_the_beginning_of_a_sequence_counts_again_after_half_a_second(
+    ranges: Ranges, terminal: int
+) -> None:
+    keyboard = Keyboard(ranges)
+    assert pressed(keyboard, terminal, b"\x1b[", now=1.0) is None
+    assert pressed(keyboard, terminal, b"1", now=1.6) is State.DAMPING
+
+
 def test_an_unattended_keyboard_stops_and_a_terminal_that_is_gone_damps(ranges: Ranges, terminal: int) -> None:
     keyboard = Keyboard(ranges)
     pressed(keyboard, terminal, b"ii", now=1.0)
@@ -177,6 +191,21 @@ def test_datagrams_from_before_the_robot_was_ready_are_dropped(source: Udp) -> N
 def test_damping_wins_over_requests_that_follow_it(source: Udp) -> None:
     send(source, b'{"request": "damping"}', b'{"request": "run"}')
     assert source.wanted(0.0, None).request is State.DAMPING
+
+
+@pytest.mark.parametrize("data", [b'{"request": "damping", "velocity": [0.3]}', b'{"request": "damping", "yaw": 0}'])
+def test_a_request_to_damp_counts_whatever_else_is_wrong(source: Udp, data: bytes) -> None:
+    send(source, data)
+    assert source.wanted(0.0, None).request is State.DAMPING
+
+
+def test_a_pose_alone_is_no_command(sighted: Path, source: Udp) -> None:
+    source.ranges = Ranges(read_contract(sighted))
+    send(source, b'{"velocity": [0.2, 0.0]}')
+    source.wanted(1.0, None)
+    send(source, json.dumps({"seen": {"object_position": [0.3, 0.0, 0.1]}}).encode())
+    wanted = source.wanted(2.0, None)
+    assert (wanted.command[0], wanted.at, wanted.seen_at) == (0.2, 1.0, 2.0)
 
 
 def test_object_poses_of_another_source_leave_the_command_alone(sighted: Path, source: Udp) -> None:

@@ -16,8 +16,9 @@ from iowbc.onboard import messages
 from iowbc.onboard.checks import SafetyLimits
 from iowbc.onboard.machine import CycleInputs, Machine, OperatorRequest, State
 from iowbc.onboard.messages import Record
-from iowbc.onboard.operators import Ranges, object_poses
+from iowbc.onboard.operators import object_poses
 from iowbc.onboard.process import PERIOD
+from iowbc.onboard.ranges import Ranges
 from iowbc.sim.rendering.forces import Force
 from iowbc.twin.robot import SILENCE, Twin
 from iowbc.twin.support import Support

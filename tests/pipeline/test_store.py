@@ -14,8 +14,10 @@ from workplace import Workplace
 
 from iowbc import files
 from iowbc.errors import Damaged, Interrupted, PipelineFailed
-from iowbc.pipeline.store.artifact import MANIFEST
+from iowbc.pipeline.store.artifact import INGREDIENTS, MANIFEST
 from iowbc.pipeline.store.digests import data_digest
+from iowbc.pipeline.store.last_used import ever_used, record_path
+from iowbc.pipeline.store.locks import key_lock
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.store.workspace import PROGRESS, Workspace
 
@@ -238,3 +240,26 @@ def test_a_manifest_with_more_entries_is_read_and_one_of_another_form_is_called_
     rewritten(made["eval"].folder, True, results={"result.json": "deciding"})
     with pytest.raises(Damaged, match="was written by a newer version of iowbc"):
         workplace.store.find("eval", made["eval"].manifest.key)
+
+
+def test_a_damaged_record_is_made_again_from_the_artifacts(workplace: Workplace) -> None:
+    workplace.run()
+    workplace.run("seed=7")
+    before = ever_used(workplace.store.runs, "small").keys()
+    path = record_path(workplace.store.runs, "small")
+    path.write_text(path.read_text()[:40])
+    workplace.run()
+    assert ever_used(workplace.store.runs, "small").keys() == before
+
+
+def test_gc_spares_what_an_attempt_reads(workplace: Workplace) -> None:
+    workplace.run()
+    fit = workplace.store.artifacts("rg-fit")[0]
+    attempt = workplace.folder / "runs" / "work" / ("f" * 64)
+    (attempt / "out").mkdir(parents=True)
+    (attempt / INGREDIENTS).write_text(json.dumps({"inputs": {"rg-fit": fit.manifest.digest}}))
+    with key_lock(workplace.store.runs, attempt.name, on_wait=lambda _: None, interrupted=lambda: False):
+        removed = workplace.command("gc", "--recipe", "small").output
+    assert "store/teacher" in removed
+    assert fit.folder.is_dir()
+    assert "store/rg-fit" not in removed

@@ -4,10 +4,15 @@ import csv
 import json
 import shlex
 import signal
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 from fake_stages import STARTED
 from workplace import SLOW, Workplace, until
 
+from iowbc.commands.points import PointProcess
+from iowbc.commands.process import RunEnding
 from iowbc.pipeline.store.locks import holder
 from iowbc.pipeline.tracking.journal import events
 
@@ -103,3 +108,12 @@ def test_mlflow_is_told_of_a_run_above_those_of_the_points(workplace: Workplace)
     ]
     assert "runs" not in told[above][-2]["paths"][0]
     assert told[above][-1]["status"] == "FINISHED"
+
+
+def test_an_ending_with_many_artifacts_does_not_fill_the_pipe(tmp_path: Path) -> None:
+    large: Any = {"eval": b"x" * 2**20}
+    task: Any = SimpleNamespace(name="point", log=tmp_path / "log", carried_out=lambda log: RunEnding(0, "", large))
+    process = PointProcess(task)
+    endings = []
+    until(lambda: endings.append(process.ending()) or endings[-1])
+    assert endings[-1] == RunEnding(0)

@@ -16,6 +16,8 @@ from iowbc.recipe.reading.document import as_yaml
 from iowbc.recipe.reading.loading import load_recipe
 from iowbc.recipe.recipe import Recipe, recipe_schema
 from iowbc.recipe.section import deciding
+from iowbc.recipe.task.task import SceneShares
+from iowbc.task.vector.setup import scene_of
 
 BARREL: dict[str, Any] = {
     "simulation.scenes.barrel": {
@@ -107,3 +109,10 @@ def test_a_recipe_whose_mesh_was_altered_is_refused(tmp_path: Path) -> None:
     values["simulation"]["scenes"]["barrel"]["object"]["mesh"]["sha256"] = "0" * 64
     with pytest.raises(ValueError, match="not that of its digest"):
         Recipe.model_validate(values)
+
+
+def test_the_order_of_custom_scenes_in_a_file_decides_nothing() -> None:
+    shares = [("barrel", 0.5), ("plank", 0.5)]
+    first, second = (SceneShares.model_validate(dict(ordered)) for ordered in (shares, shares[::-1]))
+    assert list(first) == list(second)
+    assert scene_of(8, first) == scene_of(8, second)

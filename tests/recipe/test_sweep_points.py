@@ -74,6 +74,19 @@ def test_draws_are_spread_over_orders_of_magnitude_and_more_of_them_keep_the_fir
     assert all(isinstance(found["teacher.epochs"], int) for found in settings(many))
 
 
+def test_equal_draws_are_one_point(recipe: str, tmp_path: Path) -> None:
+    text = "draws: {count: 6, values: {teacher.epochs: {low: 1, high: 3, whole: true}}}\n"
+    found = settings(load_sweep(recipe, [], described(tmp_path, text)))
+    assert sorted(int(str(one["teacher.epochs"])) for one in found) == [1, 2, 3]
+
+
+@pytest.mark.parametrize("values", ["3..3", "3,3"])
+def test_values_that_are_one_hold_for_all_points(recipe: str, values: str) -> None:
+    sweep = load_sweep(recipe, [f"seed={values}", "eval.trials=1,2"])
+    assert sweep.axes == ("eval.trials",)
+    assert {point.loaded.recipe.seed for point in sweep.points} == {3}
+
+
 def test_integers_have_both_ends_and_the_command_line_goes_before_the_file(recipe: str, tmp_path: Path) -> None:
     file = described(tmp_path, "grid:\n  teacher.clip: [0.1, 0.2, 0.3]\n  seed: [5, 6]\n")
     sweep = load_sweep(recipe, ["seed=0..2"], file)

@@ -328,3 +328,9 @@ def test_a_phone_without_a_network_draws_every_curve(runs: list[Run], tmp_path: 
     assert len(places) == 2 + 5
     assert all('data-drawn="yes"' in place for place in places)
     assert drawn.count('class="main-svg"') >= len(places)
+
+
+def test_trainings_of_the_skill_that_differ_in_their_seed_are_one_variant() -> None:
+    runs = [Run(f"{seed}", {}, {"seed": 0, "skill": {"learning": {"seed": seed, "games": 8}}}) for seed in (1, 2)]
+    (group,) = grouped(runs)
+    assert group.seeds == ("1", "2")

@@ -16,6 +16,7 @@ from iowbc.errors import Damaged, UsageError
 from iowbc.files import write_whole
 from iowbc.pipeline.console.wording import KEY_LENGTH
 from iowbc.pipeline.store.artifact import MANIFEST, RECIPE, Artifact
+from iowbc.pipeline.store.locks import lock_path, named_lock
 from iowbc.pipeline.store.runs import Runs, read_json
 from iowbc.recipe.reading.loading import LoadedRecipe
 
@@ -46,8 +47,15 @@ def remember(runs: Runs, loaded: LoadedRecipe, artifact: Artifact) -> None:
     A recipe's name stands for its artifacts without overrides. A run with overrides only adds to `ever`, unless nothing
     else goes by that name; its stages are never mixed with those of other overrides.
     """
+    with named_lock(lock_path(runs, f"recipe-{loaded.recipe.name}")):
+        _remember(runs, loaded, artifact)
+
+
+def _remember(runs: Runs, loaded: LoadedRecipe, artifact: Artifact) -> None:
     stage, key, name = artifact.manifest.stage, artifact.manifest.key, loaded.recipe.name
-    record = _record(runs, name) or LastUsed()
+    record = _record(runs, name)
+    if record is None:
+        record = LastUsed(ever=_made(runs, name) if record_path(runs, name).exists() else {})
     if not loaded.overrides or record.overrides or not (record.recipe or _published(runs, name)):
         if record.overrides != list(loaded.overrides):
             for other in record.stages:
@@ -156,6 +164,12 @@ def _record(runs: Runs, recipe: str) -> LastUsed | None:
         return LastUsed.model_validate_json(record_path(runs, recipe).read_bytes())
     except (OSError, ValueError):
         return None
+
+
+def _made(runs: Runs, recipe: str) -> dict[str, float]:
+    """Keys of the artifacts that a recipe made, for a record that is damaged, with the present time [s since 1970]."""
+    made = [file.parent.name for file in runs.store.glob(f"*/*/{MANIFEST}") if read_json(file).get("recipe") == recipe]
+    return dict.fromkeys(made, time.time())
 
 
 def _published(runs: Runs, recipe: str) -> bool:
