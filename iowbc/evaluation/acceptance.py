@@ -123,12 +123,13 @@ def _each_judged(world: Specification, episodes: list[Episode], outcomes: list[O
 def judged(recipe: Recipe, robot: Robot, asked: Acceptance, trials: list[tuple[Episode, Outcome]]) -> Accepted:
     """Result of the trials. A trial passes if survived with weight in the hands, object kept and distance covered."""
     metrics = [trial_metrics(recipe, robot, episode, outcome) for episode, outcome in trials]
+    shares = [one["weight_in_hands"] for one in metrics if not np.isnan(one["weight_in_hands"])]
     survived = [outcome.survived for _, outcome in trials]
     return Accepted(
         asked,
         survived=sum(survived),
         passed=sum(alive and transported(asked, one) for alive, one in zip(survived, metrics, strict=True)),
-        weight_in_hands=float(np.mean([one["weight_in_hands"] for one in metrics])),
+        weight_in_hands=float(np.mean(shares)) if shares else np.nan,
         transport=float(np.mean([one["transport_robot"] for one in metrics])),
         errors=np.mean([[one[name] for name in ERRORS] for one in metrics], axis=0),
     )

@@ -30,7 +30,7 @@ class Drives:
         A motor that drives gives its full torque up to a corner speed and less beyond, down to nothing at its no-load
         speed; a motor that brakes gives all. The joints a, b of a linkage are moved by two motors together:
         |τ_a| + |τ_b| ≤ the linkage's limit, split by what nominal joint control of the newest target demands. The split
-        is kept for the whole period, while the demand changes: in up to 3 % of the periods the sum exceeds the limit,
+        is kept for the whole period, while the demand changes: in up to 4 % of the periods the sum exceeds the limit,
         by up to a fifth.
         """
         effort = self.effort.copy()

@@ -26,9 +26,10 @@ SETTINGS = (
     *("commanded_distance", "partner_share", "rolling_resistance", "pull_frequency", "pull_direction"),
     *("height", "gait_period"),
 )
-"""Columns with the same value in all trials of a row."""
+"""Columns with the same value in all trials of a row, but for the length of drawn commands: that of the first trial."""
 TORQUE = "torque_rms"
-"""RMS torque as a fraction of the nominal limit: of the worst joint and, with a slash and a name, of each joint."""
+"""RMS torque as a fraction of the limit drawn for the trial: of the worst joint and, with a slash and a name, of each
+joint."""
 TRAINING = "training_seed"
 """Column that identifies the training of a variant; if absent, there is only one."""
 WORLD = "trial"

@@ -95,7 +95,8 @@ def difference_table(trials: pd.DataFrame) -> Table | None:
     caption = (
         f"Differences to {reference} in pairs of trials with the same seed and commands, over all masses of a "
         f"suite.{worlds} Errors where both survived, with their 95 % interval and Student's p; success with an exact "
-        "p. Both take the worlds as clusters, in each of which all masses and trainings stand or fall together. "
+        "p. Both take the worlds as clusters, in each of which all masses and trainings stand or fall together, and "
+        "hold for these trained policies: a further training varies, too. "
         f"Negative errors are better. No p is corrected for how many there are. {STANDS_STILL}: what doing nothing "
         f"scores, from the script, against the trials that {reference} survived. {in_common(trials)}"
     )

@@ -49,7 +49,8 @@ def interquartile_table(trials: pd.DataFrame) -> Table | None:
                 for key, one in estimates.items():
                     numbers[-1] |= one.named(key)
         if found:
-            still = {name: float(interquartile_mean(within[f"still_{name}"].to_numpy(np.float64))) for name in ERRORS}
+            common = common_rows(within)
+            still = {name: float(interquartile_mean(common[f"still_{name}"].to_numpy(np.float64))) for name in ERRORS}
             achieved = "none" if transport_commanded(within) else ABSENT
             cells = [f"{value:.3f}" for value in still.values()]
             rows.append((str(suite), STANDS_STILL, ABSENT, ABSENT, achieved, *cells, ABSENT))
@@ -57,9 +58,9 @@ def interquartile_table(trials: pd.DataFrame) -> Table | None:
     if not rows:
         return None
     caption = (
-        "All masses or cases of a suite together that every variant played: success, and interquartile means of the "
-        "errors (of the middle half of all trials), with 95 % intervals by bootstrap over trainings and worlds. A "
-        f"trial that was not survived counts as worse than any other; {FAILS}: such trials reach into the middle half. "
+        "All masses or cases of a suite together that every variant played, in as many first worlds: success, and "
+        "interquartile means of the errors (of the middle half of all trials), with 95 % intervals by bootstrap over "
+        f"trainings and worlds. A trial that was not survived counts as worse than any other; {FAILS}: such trials reach into the middle half. "
         "P: probability that a trial has a smaller norm of the four errors than one of the first algorithm at the same "
         "mass. Few trainings say little of how much another one would differ: their own rows stand below. "
         f"{STANDS_STILL}: what doing nothing scores, from the script. {in_common(played)}"
@@ -69,21 +70,29 @@ def interquartile_table(trials: pd.DataFrame) -> Table | None:
 
 
 def blocks(trials: pd.DataFrame) -> dict[str, Block]:
-    """Trials of each variant in one suite, at the masses or cases common to all trainings of all variants."""
-    trials = with_trainings(trials)
+    """The common rows of each variant in one suite."""
+    trials = common_rows(trials)
     trials = trials.assign(success=trials["succeeded"].astype(float))
     trials[list(ERRORS)] = trials[list(ERRORS)].where(trials["survived"], np.inf)
     trials["norm"] = error_norm(trials[list(ERRORS)].to_numpy(np.float64))
     groups = {
-        (str(variant), str(training)): dict(iter(own.sort_values("trial").groupby(["case", "mass"])))
+        (str(variant), str(training)): own.groupby(["case", "mass"])
         for (variant, training), own in trials.groupby(["variant", TRAINING], sort=False)
     }
-    common = [part for part in next(iter(groups.values())) if all(part in own for own in groups.values())]
-    count = min((len(own[part]) for own in groups.values() for part in common), default=0)
-    found: dict[str, dict[str, Values]] = {variant: {} for variant in variants_of(trials) if count}
-    for (variant, training), own in groups.items() if count else ():
-        found[variant][training] = np.array([own[part][list(FIGURES)].to_numpy(np.float64)[:count] for part in common])
+    found: dict[str, dict[str, Values]] = {variant: {} for variant in variants_of(trials)}
+    for (variant, training), own in groups.items():
+        found[variant][training] = np.array([part[list(FIGURES)].to_numpy(np.float64) for _, part in own])
     return dict(found)
+
+
+def common_rows(trials: pd.DataFrame) -> pd.DataFrame:
+    """Trials at the masses or cases common to all trainings of all variants, as many first ones of each, by number."""
+    trials, part, training = with_trainings(trials), ["case", "mass"], ["variant", TRAINING]
+    trials = trials.sort_values("trial", kind="stable")
+    counts = trials.groupby([*part, *training]).size().unstack(training).dropna()
+    count = int(counts.to_numpy().min()) if len(counts) else 0
+    common = pd.MultiIndex.from_frame(trials[part]).isin(counts.index)
+    return trials[common & (trials.groupby([*part, *training]).cumcount() < count)]
 
 
 def figures(block: Block) -> dict[str, Bootstrapped]:

@@ -89,9 +89,10 @@ def contact_table(summary: pd.DataFrame) -> Table:
 
 
 def heaviest(summary: pd.DataFrame) -> pd.DataFrame:
-    """Rows of the heaviest mass that each variant survived in each suite, without `PROBING` trials."""
+    """Rows of the heaviest mass that each variant survived in each suite, of several cases with it the last, without
+    `PROBING` trials."""
     survived = summary[(summary["survived"] > 0) & ~summary["kind"].isin(PROBING)]
-    rows: pd.DataFrame = survived.sort_values("mass").groupby(["suite", "variant"], sort=False).tail(1)
+    rows: pd.DataFrame = survived.sort_values("mass", kind="stable").groupby(["suite", "variant"], sort=False).tail(1)
     return rows.sort_index()
 
 

@@ -15,7 +15,7 @@ PartnerShare = Annotated[float, Field(ge=-1, le=1)] | None
 
 
 class SweepExtension(Section):
-    """Continuation of a sweep past its last mass, until no trial survives."""
+    """Continuation of a sweep past its last mass, until no trial succeeds."""
 
     step: float = Field(default=2.0, gt=0)
     """Mass increment [kg]."""
@@ -46,12 +46,13 @@ class MassSweep(Section):
     undisturbed: Masses = ()
     """Masses of an additional suite without impulses and pushes if `eval.disturbances` is on [kg]; empty: none."""
     beyond: SweepExtension | None = None
-    """Heavier masses, for as long as one trial survives; empty: stop at the last mass."""
+    """Heavier masses, for as long as one trial succeeds; empty: stop at the last mass."""
     rolling_resistance: float | None = Field(default=None, ge=0, le=1)
     """Rolling resistance μ of the crate's wheels; empty: drawn as in training."""
     partner_shares: tuple[PartnerShare, ...] = Field(default=(0.0, 0.5), min_length=1)
-    """Fractions of the weight (in pushing, of the rolling resistance) that the partner bears; the sweep runs once for
-    each. Negative: the partner resists; 0: the robot bears all; empty: drawn as in training."""
+    """Nominal fractions of the weight (in pushing, of the rolling resistance) that the partner bears, besides the
+    spring and damper of its hands; the sweep runs once for each. Negative: the partner resists; 0: the robot bears all;
+    empty: drawn as in training."""
     with_share: tuple[ShareOverride, ...] = ()
     """Other masses, or another rolling resistance, for some of these shares."""
     fixed: Held = Field(default_factory=dict)
