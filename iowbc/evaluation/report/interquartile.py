@@ -60,7 +60,8 @@ def interquartile_table(trials: pd.DataFrame) -> Table | None:
     caption = (
         "All masses or cases of a suite together that every variant played, in as many first worlds: success, and "
         "interquartile means of the errors (of the middle half of all trials), with 95 % intervals by bootstrap over "
-        f"trainings and worlds. A trial that was not survived counts as worse than any other; {FAILS}: such trials reach into the middle half. "
+        "trainings and worlds. A trial that was not survived counts as worse than any other; "
+        f"{FAILS}: such trials reach into the middle half. "
         "P: probability that a trial has a smaller norm of the four errors than one of the first algorithm at the same "
         "mass. Few trainings say little of how much another one would differ: their own rows stand below. "
         f"{STANDS_STILL}: what doing nothing scores, from the script. {in_common(played)}"
