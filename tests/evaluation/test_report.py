@@ -176,7 +176,7 @@ def test_latex_groups_rows_and_escapes() -> None:
     trials = pd.concat([trials_of(name, "lifting", {0.0: 5, 4.0: 5}) for name in VARIANTS])
     text = latex(error_table(aggregate(trials), "lifting"))
     assert text.count(r"\multirow[c]{4}{*}") == 2
-    assert text.count(r"\cline{1-15}") == 3
+    assert text.count(r"\cline{1-") == 3
     assert "±" not in text
     assert "95 \\% interval" in text
     assert "$E_{\\alpha}$ & $E_{h}$" in text

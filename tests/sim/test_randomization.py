@@ -28,6 +28,14 @@ def test_draws_cover_the_ranges_of_table_one_and_light_loads(start):
     assert np.vecdot(ahead, way) == pytest.approx(np.linalg.norm(ahead, axis=1), rel=0.02), "the crate stands ahead"
 
 
+def test_a_world_of_a_seed_stays_what_it_was(start):
+    """A new quantity in the table of draws would change all others, and with them the worlds of published trials."""
+    simulation = start(Recipe(), ["lift"], seed=2000)
+    names = ("object_mass", "motor_strength", "sensor_latency", "partner_share", "partner_stiffness", "leader_pace")
+    drawn = [float(simulation.drawn[name].flat[0]) for name in names]
+    assert drawn == pytest.approx([4.21411457, 0.92236931, 0.391002457, 0.342353439, 257.907135, 0.073171637])
+
+
 def test_every_episode_draws_anew(start, carrying):
     simulation = start(Recipe(), ["lift"] * 4)
     first = {name: values.copy() for name, values in simulation.drawn.items()}

@@ -267,7 +267,7 @@ class Compliance(Section):
     """Object masses [kg]."""
     partner_shares: tuple[float, ...] = Field(default=(0.5,), min_length=1)
     """Fractions of the weight that the partner bears."""
-    behaviours: tuple[str, ...] = BEHAVIOURS
+    behaviours: tuple[str, ...] = ("path", "follower", "leader", "stopping", "tugging", "lagging")
     """Partner behaviours, one case each; the last two never occur in training."""
     trials: int | None = Field(default=None, ge=1, le=10_000)
     """Trials of each case; empty: `eval.trials`."""
