@@ -38,7 +38,7 @@ PUBLISHED_TO = {
     "compliant_merged": "export",
     "compliant_merged_seed_1": "eval",
     "compliant_merged_seed_2": "eval",
-    "drake": "eval",
+    "drake": "teacher",
     "experts/quick": "distill",
     "experts/firm_push": "teacher",
     "scratch/push": "teacher",
