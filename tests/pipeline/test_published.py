@@ -106,7 +106,7 @@ def test_a_published_training_is_gone_on_from_unless_it_lacks_what_that_takes(
 def test_publishing_copies_verifies_and_refuses_what_has_not_run(workplace: Workplace) -> None:
     refused = workplace.command("publish", "small.yaml")
     assert refused.code == 2
-    assert "rg-dataset, rg-fit, teacher, distill, eval, export: not finished" in refused.errors
+    assert "not finished: small (rg-dataset, rg-fit, teacher, distill, eval, export)" in refused.errors
     workplace.run(until="teacher")
     done = workplace.command("publish", "small.yaml", "--until", "teacher")
     assert done.code == 0, done.errors
