@@ -37,11 +37,12 @@ def publish(
     request, console = Request(recipe, overrides or (), Runs(runs), Options(until)), stdout_console()
     without = without or []
     found = planners(request)
-    steps = [step for planner in found for step in planner.plan()]
+    plans = [planner.plan() for planner in found]
+    steps = [step for plan in plans for step in plan]
     lacking = [
         f"{planner.loaded.recipe.name} ({', '.join(missing)})"
-        for planner in found
-        if (missing := [step.stage.name for step in planner.plan() if not step.cached])
+        for planner, plan in zip(found, plans, strict=True)
+        if (missing := [step.stage.name for step in plan if not step.cached])
     ]
     if lacking:
         raise UsageError(f"not finished: {', '.join(lacking)}; to finish: {request.command()}")

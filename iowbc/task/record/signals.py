@@ -40,8 +40,8 @@ TRIAL_SIGNALS = {
 sole centre [m]; of each foot the speed at its centre of pressure [m/s], that centre's distance from the edge of the
 sole [m], the downward speed of its lowest corner [m/s], the ground's largest force in any physics step, its vertical
 and its horizontal force in the last one [N]; the size of the net force of thighs, torso and arms on the object, the
-force of partner, impulses and pulls on it [N]; the displacement of its far handle in the step [m], and
-the velocity that the partner intends for it [m/s]."""
+force of partner, impulses and pulls on it [N]; the displacement of its far handle in the step [m], and the
+velocity that the partner intends for it [m/s]."""
 JOINT_SIGNALS = ("joint_torque", "joint_saturation")
 """Signals of planned episodes with one value per joint: torque [N·m], whether it is at its limit."""
 ACTION_SIGNAL = "action"
