@@ -37,7 +37,7 @@ PUBLISHED_TO = {
     "compliant_steady": "teacher",
     "compliant_merged": "export",
     "compliant_merged_seed_1": "eval",
-    "compliant_merged_seed_2": "teacher",
+    "compliant_merged_seed_2": "eval",
     "drake": "teacher",
     "experts/quick": "distill",
     "experts/firm_push": "teacher",
