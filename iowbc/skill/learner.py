@@ -20,8 +20,6 @@ from iowbc.skill.game import HUMAN, ROBOT, Observed, TransportGame
 from iowbc.skill.trained import Trained, mean_actions
 
 Array = NDArray[np.float32]
-
-
 IMITATION_BATCH = 1024
 """Batch size of the imitation, sampled from all data so far."""
 
@@ -37,8 +35,7 @@ class SkillTraining:
         torch.manual_seed(seed)
         self.settings, self.game, self.seed = settings, game, seed
         self.steps, self.planned = 0, settings.steps
-        sizes = game.observation_sizes
-        rate = settings.learning_rate
+        sizes, rate = game.observation_sizes, settings.learning_rate
         self.agents = {
             name: Trained(sizes[name], game.action_sizes[name], settings, 0.0, rate) for name in (ROBOT, HUMAN)
         }
@@ -200,9 +197,8 @@ class SkillTraining:
     def _loss(self, agent: Trained, own: Mapping[str, Tensor], advantage: Tensor) -> tuple[Tensor, float]:
         """PPO's clipped loss of a policy, and the share of samples that are clipped."""
         clip = self.settings.clip
-        ratio = torch.exp(
-            log_density(own["action"], agent.network.body(own["input"]), agent.log_std) - own["log_density"]
-        )
+        density = log_density(own["action"], agent.network.body(own["input"]), agent.log_std)
+        ratio = torch.exp(density - own["log_density"])
         loss = -torch.min(advantage * ratio, advantage * torch.clamp(ratio, 1.0 - clip, 1.0 + clip)).mean()
         share = float(((ratio.detach() - 1.0).abs() > clip).float().mean())
         return loss - self.settings.entropy * entropy(agent.log_std), share
@@ -264,10 +260,8 @@ def _of_episodes(ended: Sequence[Mapping[str, NDArray[Any]]]) -> dict[str, float
     columns = {name: np.concatenate([np.asarray(each[name]) for each in ended]) for name in ended[0]}
     columns = {name: values.astype(np.float64) for name, values in columns.items() if values.dtype.kind in "fib"}
     learnt = columns.pop("learnt") > 0.0
-    kinds = {"scripted": ~learnt, "learnt": learnt}
-    return {
-        f"{kind}/{name}": float(values[of].mean())
-        for kind, of in kinds.items()
-        if of.any()
-        for name, values in columns.items()
-    }
+    means: dict[str, float] = {}
+    for kind, of in (("scripted", ~learnt), ("learnt", learnt)):
+        if of.any():
+            means |= {f"{kind}/{name}": float(values[of].mean()) for name, values in columns.items()}
+    return means

@@ -17,8 +17,7 @@ KINDS = (*BEHAVIOURS, AGENT, ABSENT, CLOCK, PERSON)
 a person, whose hand leads the handle (`GameBatch.hand`)."""
 Rule = Literal["lead", "follow", "clock", "stand"]
 RULES: tuple[Rule, ...] = get_args(Rule)
-"""Nominal commands of the robot: along the path; with the forces on its hands; along the path by the clock, regardless
-of the object; standing."""
+"""Nominal commands: along the path; with the forces on the hands; along the path by the clock alone; standing."""
 CLOCK_PACE = (0.5, 1.5)
 """Pace range of a human who ignores the robot; the simulation's leaders walk at most 1.5 times the nominal speed."""
 FOLLOWER = BEHAVIOURS.index("follower")
@@ -37,9 +36,8 @@ class Plan:
     known: bool
     """True if the robot knows the path."""
     mass: float | None = None
-    """Object's mass [kg]; sampled from the task's range if empty."""
     share: float | None = None
-    """The human's share; sampled from the task's range if empty."""
+    """Object's mass [kg] and the human's share; sampled from the task's ranges if empty."""
     seed: int | None = None
     """Seed of the environment's episodes; if empty, from the game's seed and the environment's number."""
     rule: Rule | None = None
@@ -57,16 +55,14 @@ class EpisodeDraws:
         goal_known: float,
         plans: Sequence[Plan] | None,
     ) -> None:
-        """`scenes`: one per game; `partners`: humans to sample; `goal_known`: probability that the robot knows the
-        path; `plans`: one per game."""
+        """`scenes`, `plans`: one per game; `partners`: humans to sample; `goal_known`: chance to know the path."""
         n, own = len(scenes), list(tasks.values())
         self._goal_known, self._plans, self.agent_share = goal_known, plans, 0.0
         self._kinds = np.array([KINDS.index(kind) for kind in partners])
         chances = np.array([[task.weight * (task.scene == scene) for task in own] for scene in scenes])
         self._tasks = np.cumsum(chances, axis=1) / chances.sum(axis=1, keepdims=True)
         self._mass, self._share = (np.array([getattr(task, name) for task in own]) for name in ("mass", "share"))
-        resistance = [np.nan if task.rolling_resistance is None else task.rolling_resistance for task in own]
-        self._resistance = np.array(resistance)
+        self._resistance = np.array([task.rolling_resistance for task in own], np.float64)
         self.task, self.kind, self.rule = np.zeros((3, n), np.int64)
         """Number of the task, of the human among `KINDS`, of the nominal command among `RULES`, (n,)."""
         self.pace = np.ones(n)

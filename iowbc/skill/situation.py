@@ -16,9 +16,8 @@ class Origin:
     """Start frames, in which paths are defined: the object's centre and the robot's heading at the start."""
 
     position: Array
-    """(n, 3) [m]."""
     heading: Array
-    """(n,) [rad]."""
+    """(n, 3) [m] and (n,) [rad]."""
 
     def turned(self, vectors: Array) -> Array:
         """World vectors (n, 3) or planar ones (n, 2) in these frames."""
@@ -27,38 +26,32 @@ class Origin:
 
 @dataclass(frozen=True)
 class GameState:
-    """n games at one time; positions and vectors in the start frame."""
+    """n games at one time; positions and velocities (n, 3) in the start frame, the others (n,); SI units."""
 
     path: Indices
-    """Numbers of the paths, (n,)."""
+    """Numbers of the paths."""
     position: Array
-    """Object's centre, (n, 3) [m]."""
     velocity: Array
-    """Object's centre, (n, 3) [m/s]."""
+    """Of the object's centre."""
     yaw: Array
-    """Yaw of the object, (n,) [rad]."""
     yaw_rate: Array
-    """Yaw rate of the object, (n,) [rad/s]."""
     tilt: Array
-    """Tilt of the object from upright, (n,) [rad]."""
+    """Of the object; tilt from upright."""
     handle: Array
-    """Far handle, (n, 3) [m]."""
     handle_velocity: Array
-    """(n, 3) [m/s]."""
+    """Of the far handle."""
     heading: Array
-    """Heading of the robot, (n,) [rad]."""
     base: Array
-    """Pelvis, (n, 3) [m]."""
+    """Heading of the robot, position of its pelvis."""
     covered: Array
-    """Arc length that the object has covered, (n,) [m]."""
+    """Arc length that the object has covered."""
     lateral: Array
-    """Distance of the object from its path, positive to the left, (n,) [m]."""
+    """Distance of the object from its path, positive to the left."""
     yaw_error: Array
-    """Yaw of the object less the path's heading, (n,) [rad]."""
     height_error: Array
-    """Height of the object less the path's, (n,) [m]."""
+    """Yaw of the object less the path's heading, and height of the object less the path's."""
     left: Array
-    """Remaining arc length, (n,) [m]."""
+    """Remaining arc length."""
 
 
 def situation(

@@ -1,6 +1,5 @@
 """Tables and figure of the skill layer's games: forces and the worst partner first, then success."""
 
-from collections.abc import Mapping
 from functools import cache
 
 import numpy as np
@@ -102,10 +101,7 @@ def estimate(games: pd.DataFrame, figure: str, whole: bool = False) -> Bootstrap
 
 def by_training(games: pd.DataFrame, figure: str) -> Values:
     """A metric by training and episode, (trainings, episodes)."""
-    wide = games.assign(**{figure: games[figure].astype(np.float64)}).pivot(
-        index="training", columns=UNIT, values=figure
-    )
-    return wide.to_numpy(np.float64)
+    return games.pivot(index="training", columns=UNIT, values=figure).to_numpy(np.float64)
 
 
 def worst_partner(games: pd.DataFrame) -> Bootstrapped:
@@ -142,26 +138,21 @@ def headline(games: pd.DataFrame) -> dict[str, float]:
     found: dict[str, float] = {}
     for (label, known), own in games.groupby(["label", "known"], sort=False):
         name = f"{label}/{'known' if known else 'human_only'}".replace(" ", "_")
-        values: Mapping[str, float] = {
-            "partner_force_p90": float(interquartile_mean(own[FORCE].to_numpy(np.float64))),
-            "worst_partner": worst_partner(own).value,
-            "success": float(own[SUCCESS].mean()),
-        }
-        found |= {f"{name}/{figure}": value for figure, value in values.items()}
+        found[f"{name}/partner_force_p90"] = float(interquartile_mean(own[FORCE].to_numpy(np.float64)))
+        found[f"{name}/worst_partner"] = worst_partner(own).value
+        found[f"{name}/success"] = float(own[SUCCESS].mean())
     return found
 
 
 def figure(games: pd.DataFrame) -> Figure:
     """Force and success by partner and by whether the robot knows the path."""
-    labels = list(dict.fromkeys(games["label"]))
+    labels, titles = list(dict.fromkeys(games["label"])), {FORCE: "partner force p90 [N]", SUCCESS: "success [share]"}
     kinds = [known for known in (True, False) if known in set(games["known"])]
     drawing = Figure(figsize=(11.0, 3.2 * len(kinds)), layout="constrained")
     grid = drawing.subplots(len(kinds), 2, squeeze=False)
     for axes, known in zip(grid, kinds, strict=True):
         partners = list(dict.fromkeys(games[games["known"] == known]["partner"]))
-        for panel, (name, title) in zip(
-            axes, ((FORCE, "partner force p90 [N]"), (SUCCESS, "success [share]")), strict=True
-        ):
+        for panel, (name, title) in zip(axes, titles.items(), strict=True):
             heights, intervals = {}, {}
             for label in labels:
                 own = games[(games["label"] == label) & (games["known"] == known)]
