@@ -15,9 +15,8 @@ class Dataset:
     """Kept samples with their labels (leading dimension n), and rejected samples with their reasons (r)."""
 
     index: Array
-    """Sample numbers, shape (n,)."""
     group: Array
-    """Mirror images share a group, shape (n,)."""
+    """Numbers of samples and of groups, shape (n,); mirror images share a group."""
     arm: Array
     """Arm postures, shape (n, 14) [rad]."""
     command: Array
@@ -25,9 +24,8 @@ class Dataset:
     support: Array
     """The labels: support postures, shape (n, 15) [rad]."""
     base_position: Array
-    """Base position from the middle of the soles, shape (n, 3) [m]."""
     base_quaternion: Array
-    """Base orientation, wxyz, shape (n, 4)."""
+    """Position of the base from the middle of the soles, shape (n, 3) [m], and orientation, wxyz, shape (n, 4)."""
     wrench: Array
     """Wrench of the ground on each sole in the sole's frame, force then moment, shape (n, 2, 6) [N, N·m]."""
     torque: Array
@@ -39,15 +37,14 @@ class Dataset:
     rejected_command: Array
     """Height [m] and torso pitch [rad] of samples without a label, shape (r, 2)."""
     rejected_index: Array
-    """Sample numbers of the rejected samples, shape (r,)."""
     rejected_reason: Array
-    """Reasons for rejection, shape (r,), text."""
+    """Their sample numbers, and reasons for rejection as text, shape (r,)."""
 
     def __len__(self) -> int:
         return len(self.index)
 
     def save(self, path: Path) -> None:
-        np.savez_compressed(path, allow_pickle=False, **{f.name: getattr(self, f.name) for f in fields(self)})
+        np.savez_compressed(path, allow_pickle=False, **vars(self))
 
     @classmethod
     def load(cls, path: Path) -> "Dataset":
@@ -57,12 +54,10 @@ class Dataset:
             if missing:
                 raise ValueError(f"{path}: no arrays {', '.join(missing)}; make it anew with `--force rg-dataset`")
             dataset = cls(**{f.name: stored[f.name] for f in fields(cls)})
-        for f in fields(cls):
-            values = getattr(dataset, f.name)
+        for name, values in vars(dataset).items():
             if values.dtype.kind == "f" and not np.isfinite(values).all():
-                raise ValueError(
-                    f"{path}: {f.name} has values that are not finite; make it anew with `--force rg-dataset`"
-                )
+                text = f"{path}: {name} has values that are not finite"
+                raise ValueError(f"{text}; make it anew with `--force rg-dataset`")
         return dataset
 
 

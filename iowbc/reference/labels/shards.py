@@ -17,13 +17,11 @@ class Shard:
     """Labels of some samples, and reasons for rejecting others."""
 
     kept: Indices
-    """Numbers of the labelled samples, shape (k,)."""
     labels: Mapping[str, Array]
-    """Arrays of the labels, leading dimension k."""
+    """Numbers of the labelled samples, shape (k,), and arrays of their labels, leading dimension k."""
     rejected: Indices
-    """Numbers of the samples without a label, shape (r,)."""
     reasons: Sequence[str]
-    """Reason for each rejection."""
+    """Numbers of the samples without a label, shape (r,), and the reason of each."""
 
 
 def cut(indices: Sequence[int], size: int, folder: Path) -> tuple[list[list[int]], list[Path]]:
