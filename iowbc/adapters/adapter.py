@@ -21,9 +21,8 @@ class Seen:
     velocity: Array
     """Commanded v_x, v_y [m/s] and yaw rate [rad/s], heading frame, clipped to the adapter's ranges, (n, 3)."""
     height: Array
-    """Commanded height of the pelvis, (n, 1) [m]."""
     pitch: Array
-    """Commanded torso pitch, (n, 1) [rad]."""
+    """Commanded height of the pelvis [m] and torso pitch [rad], (n, 1)."""
     walking: Mask
     """True if the commanded velocity requires stepping, (n,)."""
     walked: Array
@@ -33,11 +32,9 @@ class Seen:
     angular_velocity: Array
     """Of the base, base frame, (n, 3) [rad/s]."""
     joint_position: Array
-    """(n, joints) [rad]."""
     joint_deviation: Array
-    """From the adapter's default posture, (n, joints) [rad]."""
     joint_velocity: Array
-    """(n, joints) [rad/s]."""
+    """(n, joints) [rad, rad/s]; the deviation is from the adapter's default posture."""
     action: Array
     """Network output of the previous step, initially zero, (n, acted)."""
 
@@ -60,9 +57,8 @@ class Adapter:
     default: Array
     """Reference posture of observation and action, (joints,) [rad]."""
     kp: Array
-    """Position gains, (joints,) [N·m/rad]."""
     kd: Array
-    """Velocity gains, (joints,) [N·m·s/rad]."""
+    """Position gains [N·m/rad] and velocity gains [N·m·s/rad], (joints,)."""
     acted: tuple[str, ...]
     """Joints of the action, in the controller's order: at least legs and waist. Its arm targets are used if
     `eval.public.arms` is `own` or `free`, which require all arm joints; otherwise the arms hold the grasp by this
@@ -99,24 +95,13 @@ class Adapter:
 
 
 def validate_adapter(adapter: Adapter, robot: Robot, frequency: float, *, moves_arms: bool = False) -> None:
-    """Check an adapter against a robot and a control rate [Hz], and its network against its observation.
-    `moves_arms`: the controller acts on all arm joints, too.
-
-    Raises StageFailed with the field, its value and the valid values.
-    """
-    problems = [
-        *_joint_name_problems(adapter, robot, moves_arms),
-        *(
-            f"{name}: has shape {np.shape(values)}, expected {(len(names),)} finite numbers"
-            for name, values, names in (
-                ("default", adapter.default, adapter.joints),
-                ("kp", adapter.kp, adapter.joints),
-                ("kd", adapter.kd, adapter.joints),
-                ("scale", adapter.scale, adapter.acted),
-            )
-            if np.shape(values) != (len(names),) or not np.isfinite(values).all()
-        ),
-    ]
+    """Check an adapter against a robot and a control rate [Hz], and its network against its observation. `moves_arms`:
+    the controller acts on all arm joints, too. Raises StageFailed with the field, its value and the valid values."""
+    problems = _joint_name_problems(adapter, robot, moves_arms)
+    for name in ("default", "kp", "kd", "scale"):
+        values, expected = getattr(adapter, name), (len(adapter.acted if name == "scale" else adapter.joints),)
+        if np.shape(values) != expected or not np.isfinite(values).all():
+            problems.append(f"{name}: has shape {np.shape(values)}, expected {expected} finite numbers")
     if adapter.frequency != frequency:
         text = f"frequency: is {adapter.frequency:g} Hz, the trials run at {frequency:g} Hz"
         problems.append(f"{text}; set task.control_frequency to it")
@@ -158,8 +143,7 @@ def _check_network_output(adapter: Adapter) -> None:
 
 def standing(adapter: Adapter) -> Seen:
     """Measurements of a robot that stands upright in the adapter's default posture."""
-    zero = np.zeros((1, 1))
-    still = np.zeros((1, len(adapter.joints)))
+    zero, still = np.zeros((1, 1)), np.zeros((1, len(adapter.joints)))
     return Seen(
         velocity=np.zeros((1, 3)),
         height=zero,

@@ -51,10 +51,8 @@ class AdaptedPolicy:
 
     def act(self, observation: NDArray[np.float32], privileged: NDArray[np.float32]) -> NDArray[np.float32]:
         """Residual action, shape (n, A), from s_t, shape (n, S); with arm targets, shape (n, A + arm joints), if the
-        controller moves the arms. The action of an unused row (s_t all zeros) is zero.
-
-        Raises StageFailed if the network's output is not finite.
-        """
+        controller moves the arms. The action of an unused row (s_t all zeros) is zero. Raises StageFailed if the
+        network's output is not finite."""
         del privileged
         rows = observation.astype(np.float64)
         seen = self._seen({name: rows[:, place] for name, place in self._places.items()})
@@ -69,8 +67,7 @@ class AdaptedPolicy:
         target = self._default + self._own * self._output[:, self._acted]
         support = target[:, : len(self._scale)]
         support[:] = (support - rows[:, self._places["support_reference"]]) / self._scale
-        action: NDArray[np.float32] = (target * filled[:, None]).astype(np.float32)
-        return action
+        return np.asarray(target * filled[:, None], np.float32)
 
     def _seen(self, parts: dict[str, Array]) -> Seen:
         robot, command = self._robot, parts["command"]
