@@ -2,13 +2,12 @@
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
+from iowbc.arrays import Array, Indices
 from iowbc.learning import checkpoint
 from iowbc.learning.checkpoint import Arrays, prefixed, under
 from iowbc.learning.gaussian import divergence, entropy, log_density
@@ -19,7 +18,6 @@ from iowbc.recipe.skill.skill import SkillLearning
 from iowbc.skill.game import HUMAN, ROBOT, Observed, TransportGame
 from iowbc.skill.trained import Trained, mean_actions
 
-Array = NDArray[np.float32]
 IMITATION_BATCH = 1024
 """Batch size of the imitation, sampled from all data so far."""
 
@@ -76,9 +74,9 @@ class SkillTraining:
         self.critic.normalization.discounted[:] = 0.0
         seeds = np.random.default_rng([self.seed, self.steps]).integers(2**63, size=game.n, dtype=np.uint64)
         observed = game.reset(seeds, self.agent_share)
-        kept: dict[str, list[NDArray[Any]]] = defaultdict(list)
-        cut: list[tuple[int, NDArray[np.int64], Array]] = []
-        episodes: list[dict[str, NDArray[Any]]] = []
+        kept: dict[str, list[Array]] = defaultdict(list)
+        cut: list[tuple[int, Indices, Array]] = []
+        episodes: list[dict[str, Array]] = []
         for step in range(settings.rollout):
             now = {**observed.observations, "critic": self._judged(observed)}
             now |= {"learnt": game.human_acts.copy(), "privileged": game.privileged_actions}
@@ -247,7 +245,7 @@ class SkillTraining:
             whole |= prefixed(name, each.arrays())
         return whole
 
-    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+    def restore(self, arrays: Mapping[str, Array]) -> None:
         for name, each in self.trained.items():
             each.restore(under(name, arrays))
         self.steps = int(arrays["steps"][0])
@@ -255,7 +253,7 @@ class SkillTraining:
         checkpoint.restore_random(under("random", arrays))
 
 
-def _of_episodes(ended: Sequence[Mapping[str, NDArray[Any]]]) -> dict[str, float]:
+def _of_episodes(ended: Sequence[Mapping[str, Array]]) -> dict[str, float]:
     """Means over the ended episodes, by kind of human."""
     columns = {name: np.concatenate([np.asarray(each[name]) for each in ended]) for name in ended[0]}
     columns = {name: values.astype(np.float64) for name, values in columns.items() if values.dtype.kind in "fib"}

@@ -5,8 +5,8 @@ from functools import cache
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from iowbc.arrays import Array, Indices
 from iowbc.evaluation.report.figures import draw_bars, finish
 from iowbc.evaluation.report.statistics import RESAMPLES, Bootstrapped, bootstrapped, interquartile_mean
 from iowbc.results.table import ABSENT, Cell, Table, heads
@@ -26,8 +26,6 @@ COLUMNS = {
 }
 """Metrics of an episode with column heading and number format, in table order."""
 SEEDS_OF_THE_BOOTSTRAP = 0
-
-Values = NDArray[np.float64]
 
 
 def tables(games: pd.DataFrame, held_out: tuple[str, ...]) -> list[Table]:
@@ -93,13 +91,13 @@ def estimate(games: pd.DataFrame, figure: str, whole: bool = False) -> Bootstrap
     values = by_training(games, figure)
     drawn = values[_resamples(*values.shape)].reshape(RESAMPLES, -1)
 
-    def mean(rows: Values) -> Values:
+    def mean(rows: Array) -> Array:
         return np.asarray(rows.mean(axis=-1)) if whole else interquartile_mean(rows)
 
     return bootstrapped(mean(values.ravel()), mean(drawn))
 
 
-def by_training(games: pd.DataFrame, figure: str) -> Values:
+def by_training(games: pd.DataFrame, figure: str) -> Array:
     """A metric by training and episode, (trainings, episodes)."""
     return games.pivot(index="training", columns=UNIT, values=figure).to_numpy(np.float64)
 
@@ -120,7 +118,7 @@ def improvement(first: pd.DataFrame, other: pd.DataFrame) -> Bootstrapped:
 
 
 @cache
-def _resamples(trainings: int, units: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _resamples(trainings: int, units: int) -> tuple[Indices, Indices]:
     """Trainings (RESAMPLES, trainings, 1) and episodes (RESAMPLES, 1, units) of each resample, with replacement."""
     generator = np.random.default_rng(SEEDS_OF_THE_BOOTSTRAP)
     drawn = [[generator.integers(n, size=n) for n in (trainings, units)] for _ in range(RESAMPLES)]
