@@ -156,11 +156,8 @@ class SkillTraining:
         return explained | figures
 
     def _batches(self, count: int) -> list[Tensor]:
-        return [
-            places
-            for _ in range(self.settings.epochs)
-            for places in torch.randperm(count).chunk(self.settings.minibatches)
-        ]
+        epochs, parts = self.settings.epochs, self.settings.minibatches
+        return [places for _ in range(epochs) for places in torch.randperm(count).chunk(parts)]
 
     def _improve(self, names: Sequence[str], samples: Mapping[str, Tensor]) -> dict[str, float]:
         """Gradient steps of these policies; with HAPPO, the factor is then multiplied by their probability ratios."""
