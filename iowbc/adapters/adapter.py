@@ -21,8 +21,9 @@ class Seen:
     velocity: Array
     """Commanded v_x, v_y [m/s] and yaw rate [rad/s], heading frame, clipped to the adapter's ranges, (n, 3)."""
     height: Array
+    """Commanded height of the pelvis, (n, 1) [m]."""
     pitch: Array
-    """Commanded height of the pelvis [m] and torso pitch [rad], (n, 1)."""
+    """Commanded torso pitch, (n, 1) [rad]."""
     walking: Mask
     """True if the commanded velocity requires stepping, (n,)."""
     walked: Array
@@ -32,9 +33,11 @@ class Seen:
     angular_velocity: Array
     """Of the base, base frame, (n, 3) [rad/s]."""
     joint_position: Array
+    """(n, joints) [rad]."""
     joint_deviation: Array
+    """From the adapter's default posture, (n, joints) [rad]."""
     joint_velocity: Array
-    """(n, joints) [rad, rad/s]; the deviation is from the adapter's default posture."""
+    """(n, joints) [rad/s]."""
     action: Array
     """Network output of the previous step, initially zero, (n, acted)."""
 
@@ -57,8 +60,9 @@ class Adapter:
     default: Array
     """Reference posture of observation and action, (joints,) [rad]."""
     kp: Array
+    """Position gains, (joints,) [N·m/rad]."""
     kd: Array
-    """Position gains [N·m/rad] and velocity gains [N·m·s/rad], (joints,)."""
+    """Velocity gains, (joints,) [N·m·s/rad]."""
     acted: tuple[str, ...]
     """Joints of the action, in the controller's order: at least legs and waist. Its arm targets are used if
     `eval.public.arms` is `own` or `free`, which require all arm joints; otherwise the arms hold the grasp by this
@@ -94,8 +98,11 @@ class Adapter:
 
 
 def validate_adapter(adapter: Adapter, robot: Robot, frequency: float, *, moves_arms: bool = False) -> None:
-    """Check an adapter against a robot and a control rate [Hz], and its network against its observation. `moves_arms`:
-    the controller acts on all arm joints, too. Raises StageFailed with the field, its value and the valid values."""
+    """Check an adapter against a robot and a control rate [Hz], and its network against its observation.
+    `moves_arms`: the controller acts on all arm joints, too.
+
+    Raises StageFailed with the field, its value and the valid values.
+    """
     problems = _joint_name_problems(adapter, robot, moves_arms)
     for name in ("default", "kp", "kd", "scale"):
         values, expected = getattr(adapter, name), (len(adapter.acted if name == "scale" else adapter.joints),)

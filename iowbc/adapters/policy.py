@@ -50,8 +50,10 @@ class AdaptedPolicy:
 
     def act(self, observation: Array, privileged: Array) -> Array:
         """Residual action, shape (n, A), from s_t, shape (n, S); with arm targets, shape (n, A + arm joints), if the
-        controller moves the arms. The action of an unused row (s_t all zeros) is zero. Raises StageFailed if the
-        network's output is not finite."""
+        controller moves the arms. The action of an unused row (s_t all zeros) is zero.
+
+        Raises StageFailed if the network's output is not finite.
+        """
         del privileged
         rows = observation.astype(np.float64)
         seen = self._seen({name: rows[:, place] for name, place in self._places.items()})

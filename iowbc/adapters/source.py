@@ -26,8 +26,10 @@ CONTRACT = "it takes the controller's pathlib.Path and returns an iowbc.adapters
 
 
 def load_adapter(controller: PublicController) -> Adapter:
-    """The adapter of a public controller, after a check of its file's digest. Raises StageFailed if the file or its
-    package is missing, the digest differs, or no adapter can be made."""
+    """The adapter of a public controller, after a check of its file's digest.
+
+    Raises StageFailed if the file or its package is missing, the digest differs, or no adapter can be made.
+    """
     policy = policy_path(controller.policy)
     found = policy_digest(policy)
     if found != controller.sha256:
@@ -88,7 +90,9 @@ def _folder(source: Path, description: str) -> Path:
 
 def policy_path(named: str) -> Path:
     """The file or folder of a controller: a path, or PACKAGE:PATH of an installed package, which is not imported.
-    Raises StageFailed."""
+
+    Raises StageFailed.
+    """
     package, colon, inside = named.partition(":")
     path = Path(named)
     if colon:

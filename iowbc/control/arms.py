@@ -12,8 +12,10 @@ X, Y = 0, 1
 
 
 def arm_chains(robot: Robot) -> tuple[list[tuple[Body, ...]], tuple[Body, ...]]:
-    """Bodies of both arms from the torso outward, and those from the base to the torso. If the torso is fixed to
-    another body, the frame is that of the body that moves."""
+    """Bodies of both arms from the torso outward, and those from the base to the torso.
+
+    If the torso is fixed to another body, the frame is that of the body that moves.
+    """
     torso = robot.tree.mover(robot.torso).name
     return [robot.tree.chain(body, torso) for body in robot.wrist_bodies], robot.tree.chain(torso, robot.base)
 

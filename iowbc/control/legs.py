@@ -25,12 +25,15 @@ class Legs(Constants):
     hip: Pair
     """The hip pitch axis ahead of and above the base."""
     thigh: Pair
+    """The knee from the hip pitch axis."""
     shank: Pair
+    """The ankle pitch axis from the knee."""
     sole: Pair
-    """From the hip pitch axis to the knee, on to the ankle pitch axis, and on to the sole's centre."""
+    """The sole's centre from the ankle pitch axis."""
     roll: Pair
+    """The hip roll axis from the hip pitch axis."""
     yaw: Pair
-    """Hip roll and hip yaw axes from the hip pitch axis."""
+    """The hip yaw axis from the hip pitch axis."""
     tilt: Pair
     """Direction of the hip yaw axis."""
     ankle_roll_z: Array

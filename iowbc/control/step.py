@@ -49,7 +49,7 @@ class State:
 STATE: Mapping[str, tuple[str, str, str]] = {
     name: hint.__metadata__ for name, hint in get_type_hints(State, include_extras=True).items()
 }
-"""Unit, frame and meaning of each part of the state."""
+"""Unit, frame and meaning of each part of the state, in its order in the packed one."""
 
 
 @dataclass(frozen=True)

@@ -46,12 +46,14 @@ class GameOutcome:
     reward: Array
     """Shared by both agents, (n,) float32."""
     terminated: Mask
+    """(n,)."""
     truncated: Mask
-    """Episodes that ended, the truncated ones by the time limit, (n,)."""
+    """Ended by the time limit, (n,)."""
     final: Observed
     """Before ended episodes have restarted."""
     figures: Mapping[str, Array]
-    """Metrics of the k episodes that ended, by name, (k,), in the games' order; task and partner are names."""
+    """Metrics of the k episodes that ended, in the order of the games, by name, (k,); see
+    `iowbc.skill.figures.FIGURES`. Task and partner are names."""
 
 
 class TransportGame:

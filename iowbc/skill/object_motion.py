@@ -23,8 +23,9 @@ class ObjectMotion:
     yaw_rate: Array
     """Yaw rate of the path at that speed, (n,) [rad/s], without yaw correction."""
     heading: Array
+    """Heading of the path, (n,) [rad]."""
     height: Array
-    """Heading of the path, (n,) [rad], and its height a little ahead, (n,) [m]."""
+    """Height of the path a little ahead, (n,) [m]."""
 
 
 def pursue(settings: PathFollowing, paths: Paths, now: GameState) -> ObjectMotion:

@@ -17,7 +17,8 @@ KINDS = (*BEHAVIOURS, AGENT, ABSENT, CLOCK, PERSON)
 a person, whose hand leads the handle (`GameBatch.hand`)."""
 Rule = Literal["lead", "follow", "clock", "stand"]
 RULES: tuple[Rule, ...] = get_args(Rule)
-"""Nominal commands: along the path; with the forces on the hands; along the path by the clock alone; standing."""
+"""Nominal commands of the robot: along the path; with the forces on its hands; along the path by the clock, regardless
+of the object; standing."""
 CLOCK_PACE = (0.5, 1.5)
 """Pace range of a human who ignores the robot; the simulation's leaders walk at most 1.5 times the nominal speed."""
 FOLLOWER = BEHAVIOURS.index("follower")
@@ -36,8 +37,9 @@ class Plan:
     known: bool
     """True if the robot knows the path."""
     mass: float | None = None
+    """Object's mass [kg]; sampled from the task's range if empty."""
     share: float | None = None
-    """Object's mass [kg] and the human's share; sampled from the task's ranges if empty."""
+    """The human's share; sampled from the task's range if empty."""
     seed: int | None = None
     """Seed of the environment's episodes; if empty, from the game's seed and the environment's number."""
     rule: Rule | None = None

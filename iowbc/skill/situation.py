@@ -16,8 +16,9 @@ class Origin:
     """Start frames, in which paths are defined: the object's centre and the robot's heading at the start."""
 
     position: Array
+    """(n, 3) [m]."""
     heading: Array
-    """(n, 3) [m] and (n,) [rad]."""
+    """(n,) [rad]."""
 
     def turned(self, vectors: Array) -> Array:
         """World vectors (n, 3) or planar ones (n, 2) in these frames."""
@@ -29,29 +30,35 @@ class GameState:
     """n games at one time; positions and velocities (n, 3) in the start frame, the others (n,); SI units."""
 
     path: Indices
-    """Numbers of the paths."""
+    """Numbers of the paths, (n,)."""
     position: Array
+    """Object's centre, (n, 3) [m]."""
     velocity: Array
-    """Of the object's centre."""
+    """Object's centre, (n, 3) [m/s]."""
     yaw: Array
+    """Yaw of the object, (n,) [rad]."""
     yaw_rate: Array
+    """Yaw rate of the object, (n,) [rad/s]."""
     tilt: Array
-    """Of the object; tilt from upright."""
+    """Tilt of the object from upright, (n,) [rad]."""
     handle: Array
+    """Far handle, (n, 3) [m]."""
     handle_velocity: Array
-    """Of the far handle."""
+    """(n, 3) [m/s]."""
     heading: Array
+    """Heading of the robot, (n,) [rad]."""
     base: Array
-    """Heading of the robot, position of its pelvis."""
+    """Pelvis, (n, 3) [m]."""
     covered: Array
-    """Arc length that the object has covered."""
+    """Arc length that the object has covered, (n,) [m]."""
     lateral: Array
-    """Distance of the object from its path, positive to the left."""
+    """Distance of the object from its path, positive to the left, (n,) [m]."""
     yaw_error: Array
+    """Yaw of the object less the path's heading, (n,) [rad]."""
     height_error: Array
-    """Yaw of the object less the path's heading, and height of the object less the path's."""
+    """Height of the object less the path's, (n,) [m]."""
     left: Array
-    """Remaining arc length."""
+    """Remaining arc length, (n,) [m]."""
 
 
 def situation(

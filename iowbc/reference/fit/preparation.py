@@ -24,8 +24,9 @@ class Prepared:
     train: FitData
     validation: FitData
     training: Indices
+    """Rows of the dataset for training, without mirror images."""
     held_out: Indices
-    """Rows of the dataset for training, without mirror images, and for the gates."""
+    """Rows of the dataset kept for the gates."""
     samples: list[Sample]
     """All rows as samples."""
     kinematics: TaskKinematics

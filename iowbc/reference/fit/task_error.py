@@ -21,13 +21,15 @@ class TaskErrors:
     """Errors of postures that stand on both soles, the soles fitted together to their places, (n,) [m, rad]."""
 
     height: Array
+    """Height reached minus commanded, shape (n,) [m]."""
     pitch: Array
-    """Height and torso pitch reached minus commanded."""
+    """Torso pitch reached minus commanded, shape (n,) [rad]."""
     foot: Array
+    """Distance of each sole centre from its place, shape (n,) [m]."""
     foot_rotation: Array
-    """Distance of each sole centre from its place, and angle of each sole from the common sole plane."""
+    """Angle of each sole from the common sole plane, shape (n,) [rad]."""
     margin: Array
-    """Distance of the projected centre of mass inside the support polygon."""
+    """Distance of the projected centre of mass inside the support polygon, shape (n,) [m]."""
 
 
 class TaskKinematics:

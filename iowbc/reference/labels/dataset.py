@@ -15,8 +15,9 @@ class Dataset:
     """Kept samples with their labels (leading dimension n), and rejected samples with their reasons (r)."""
 
     index: Array
+    """Sample numbers, shape (n,)."""
     group: Array
-    """Numbers of samples and of groups, shape (n,); mirror images share a group."""
+    """Mirror images share a group, shape (n,)."""
     arm: Array
     """Arm postures, shape (n, 14) [rad]."""
     command: Array
@@ -24,8 +25,9 @@ class Dataset:
     support: Array
     """The labels: support postures, shape (n, 15) [rad]."""
     base_position: Array
+    """Base position from the middle of the soles, shape (n, 3) [m]."""
     base_quaternion: Array
-    """Position of the base from the middle of the soles, shape (n, 3) [m], and orientation, wxyz, shape (n, 4)."""
+    """Base orientation, wxyz, shape (n, 4)."""
     wrench: Array
     """Wrench of the ground on each sole in the sole's frame, force then moment, shape (n, 2, 6) [N, N·m]."""
     torque: Array
@@ -37,8 +39,9 @@ class Dataset:
     rejected_command: Array
     """Height [m] and torso pitch [rad] of samples without a label, shape (r, 2)."""
     rejected_index: Array
+    """Sample numbers of the rejected samples, shape (r,)."""
     rejected_reason: Array
-    """Their sample numbers, and reasons for rejection as text, shape (r,)."""
+    """Reasons for rejection, shape (r,), text."""
 
     def __len__(self) -> int:
         return len(self.index)

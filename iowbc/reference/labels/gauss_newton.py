@@ -48,11 +48,13 @@ class PostureCost:
     """Cost and equalities at a configuration, with derivatives by its tangent (21,)."""
 
     residual: Array
-    gradient: Array
     """Centre of mass over the middle of the feet (2), height, torso rotation (3), support joints (15): (21,)."""
+    gradient: Array
+    """(21, 21)."""
     error: Array
-    equality: Array
     """Errors of both soles from their places, (12,)."""
+    equality: Array
+    """(12, 21)."""
 
     @classmethod
     def at(

@@ -17,11 +17,13 @@ class Shard:
     """Labels of some samples, and reasons for rejecting others."""
 
     kept: Indices
+    """Numbers of the labelled samples, shape (k,)."""
     labels: Mapping[str, Array]
-    """Numbers of the labelled samples, shape (k,), and arrays of their labels, leading dimension k."""
+    """Arrays of the labels, leading dimension k."""
     rejected: Indices
+    """Numbers of the samples without a label, shape (r,)."""
     reasons: Sequence[str]
-    """Numbers of the samples without a label, shape (r,), and the reason of each."""
+    """Reason for each rejection."""
 
 
 def cut(indices: Sequence[int], size: int, folder: Path) -> tuple[list[list[int]], list[Path]]:
