@@ -35,7 +35,8 @@ def compare_methods(dataset: Dataset, again: Shard) -> MethodComparison | None:
     """Differences where optimal control has a label too; None where it has none."""
     if not len(again.kept):
         return None
-    rows = np.searchsorted(dataset.index, again.kept)
+    row = {int(index): place for place, index in enumerate(dataset.index)}
+    rows = [row[int(index)] for index in again.kept]
     difference = np.abs(dataset.support[rows] - again.labels["support"]).max(axis=1)
     metrics = {
         "crosscheck_samples": float(len(difference)),
