@@ -84,11 +84,10 @@ class Adapter:
     standing: float = 0.01
     """Commanded planar speed [m/s] and yaw rate [rad/s] up to which the robot stands."""
 
-    def bounds(self) -> tuple[Array, Array]:
-        """Minimum and maximum commanded velocities, (3,) each."""
+    def bounds(self) -> Array:
+        """Minimum and maximum commanded velocities, (2, 3)."""
         known = self.ranges or {}
-        low, high = zip(*(known.get(name, (-np.inf, np.inf)) for name in VELOCITIES), strict=True)
-        return np.array(low), np.array(high)
+        return np.array([known.get(name, (-np.inf, np.inf)) for name in VELOCITIES]).T
 
     def observed(self, past: tuple[Array, ...]) -> Array:
         """Network input, (n, size), from the last values of each term, (n, history, size of the term) each."""
@@ -104,19 +103,11 @@ def validate_adapter(adapter: Adapter, robot: Robot, frequency: float, *, moves_
 
     Raises StageFailed with the field, its value and the valid values.
     """
-    problems = [
-        *_joint_name_problems(adapter, robot, moves_arms),
-        *(
-            f"{name}: has shape {np.shape(values)}, expected {(len(names),)} finite numbers"
-            for name, values, names in (
-                ("default", adapter.default, adapter.joints),
-                ("kp", adapter.kp, adapter.joints),
-                ("kd", adapter.kd, adapter.joints),
-                ("scale", adapter.scale, adapter.acted),
-            )
-            if np.shape(values) != (len(names),) or not np.isfinite(values).all()
-        ),
-    ]
+    problems = _joint_name_problems(adapter, robot, moves_arms)
+    for name in ("default", "kp", "kd", "scale"):
+        values, expected = getattr(adapter, name), (len(adapter.acted if name == "scale" else adapter.joints),)
+        if np.shape(values) != expected or not np.isfinite(values).all():
+            problems.append(f"{name}: has shape {np.shape(values)}, expected {expected} finite numbers")
     if adapter.frequency != frequency:
         text = f"frequency: is {adapter.frequency:g} Hz, the trials run at {frequency:g} Hz"
         problems.append(f"{text}; set task.control_frequency to it")
@@ -158,8 +149,7 @@ def _check_network_output(adapter: Adapter) -> None:
 
 def standing(adapter: Adapter) -> Seen:
     """Measurements of a robot that stands upright in the adapter's default posture."""
-    zero = np.zeros((1, 1))
-    still = np.zeros((1, len(adapter.joints)))
+    zero, still = np.zeros((1, 1)), np.zeros((1, len(adapter.joints)))
     return Seen(
         velocity=np.zeros((1, 3)),
         height=zero,

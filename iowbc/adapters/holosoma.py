@@ -40,11 +40,10 @@ def adapter(policy: Path) -> Adapter:
     if missing:
         raise StageFailed(f"{policy}: its metadata lacks {', '.join(missing)}, which walkers of holosoma have")
     joints = tuple(said["dof_names"])
+    default = [DEFAULT.get(name.removesuffix("_joint"), DEFAULT.get(kind_of(name), 0.0)) for name in joints]
     return Adapter(
         joints=joints,
-        default=np.array(
-            [DEFAULT.get(name.removesuffix("_joint"), DEFAULT.get(kind_of(name), 0.0)) for name in joints]
-        ),
+        default=np.array(default),
         kp=np.array(said["kp"]),
         kd=np.array(said["kd"]),
         acted=joints,

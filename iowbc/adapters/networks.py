@@ -39,11 +39,7 @@ def metadata(path: Path) -> Mapping[str, Any]:
 def _onnx(path: Path) -> Callable[..., Array]:
     session = open_session(path)
     names = [one.name for one in session.get_inputs()]
-
-    def run(*inputs: Array) -> Array:
-        return np.asarray(session.run(None, dict(zip(names, inputs, strict=True)))[0])
-
-    return run
+    return lambda *inputs: np.asarray(session.run(None, dict(zip(names, inputs, strict=True)))[0])
 
 
 def _torchscript(path: Path) -> Callable[..., Array]:

@@ -1,10 +1,9 @@
 """Public controllers as policies in the trials: observation from s_t, joint targets as residual action."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from iowbc.adapters.adapter import Adapter, Seen
-from iowbc.arrays import Array
+from iowbc.arrays import Array, Mask
 from iowbc.control.action import action_scale
 from iowbc.control.command import HEIGHT, PITCH, VELOCITY, YAW_RATE
 from iowbc.control.observation import observation_layout
@@ -43,13 +42,13 @@ class AdaptedPolicy:
         self._walked, self._output = np.zeros((n, 1)), np.zeros((n, len(self.adapter.acted)))
         self._past: tuple[Array, ...] = ()
 
-    def reset(self, which: NDArray[np.bool_]) -> None:
+    def reset(self, which: Mask) -> None:
         """Clear the history of the marked environments, shape (n,)."""
         if self._starts.shape != which.shape:
             self._blank(len(which))
         self._starts |= which
 
-    def act(self, observation: NDArray[np.float32], privileged: NDArray[np.float32]) -> NDArray[np.float32]:
+    def act(self, observation: Array, privileged: Array) -> Array:
         """Residual action, shape (n, A), from s_t, shape (n, S); with arm targets, shape (n, A + arm joints), if the
         controller moves the arms. The action of an unused row (s_t all zeros) is zero.
 
@@ -69,8 +68,7 @@ class AdaptedPolicy:
         target = self._default + self._own * self._output[:, self._acted]
         support = target[:, : len(self._scale)]
         support[:] = (support - rows[:, self._places["support_reference"]]) / self._scale
-        action: NDArray[np.float32] = (target * filled[:, None]).astype(np.float32)
-        return action
+        return np.asarray(target * filled[:, None], np.float32)
 
     def _seen(self, parts: dict[str, Array]) -> Seen:
         robot, command = self._robot, parts["command"]

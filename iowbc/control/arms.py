@@ -103,10 +103,8 @@ class ArmKinematics(Constants):
     def torso_in_heading(
         self, waist: Array, pelvis_pitch: Array, pelvis_roll: Array | None = None
     ) -> tuple[Array, Array]:
-        """Rotation (n, 3, 3) and position (n, 3) [m] of the torso frame in the heading frame at the base.
-
-        `waist` (n, waist joints): positions [rad], as in the chain; `pelvis_pitch`, `pelvis_roll` (n,) [rad].
-        """
+        """Rotation (n, 3, 3) and position (n, 3) [m] of the torso frame in the heading frame at the base, for `waist`
+        (n, waist joints), as in the chain, `pelvis_pitch` and `pelvis_roll` (n,) [rad]."""
         pelvis = turn(Y, pelvis_pitch[None])
         if pelvis_roll is not None:
             pelvis = product(pelvis, turn(X, pelvis_roll[None]))

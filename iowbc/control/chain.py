@@ -1,17 +1,8 @@
 """Chains of hinges, many rows at once: where each hinge is, from the base outward.
 
 Components come first and rows last, so that NumPy's loops are long. Written here: pinocchio and MuJoCo take one posture
-at a time and are not on the robot's computer, and the same code is traced into the exported graph.
-
-An example: a forearm of 0.3 m that turns about y at the end of an upper arm of 0.2 m that turns about z. With both
-hinges at a quarter turn its end lies 0.3 m below the elbow, which lies 0.2 m to the left of the shoulder:
-
-    upper = Body("upper", None, position=(0, 0, 0), quaternion=(1, 0, 0, 0), hinge=Hinge(axis=(0, 0, 1), ...), ...)
-    lower = Body("lower", "upper", position=(0.2, 0, 0), quaternion=(1, 0, 0, 0), hinge=Hinge(axis=(0, 1, 0), ...), ...)
-    frames = Chain([[upper, lower]]).frames(np.full((2, 1, 1), np.pi / 2))     # angles of hinges, chains, rows
-    end = frames.end(np.array([0.3, 0, 0])[:, None, None])
-    end[:, 0, 0]                                                               # (0, 0.2, -0.3)
-    frames.jacobian(end)[:, :, 0, 0]                                           # columns (-0.2, 0, 0), (0, -0.3, 0)
+at a time and are not on the robot's computer, and the same code is traced into the exported graph. The last test in
+`tests/control/test_chain.py` is an example worked out by hand.
 """
 
 from collections.abc import Sequence
@@ -48,15 +39,13 @@ def product(first: Array, second: Array) -> Array:
 
 
 def turn(axis: int, angle: Array) -> Array:
-    """Rotations about a coordinate axis by angles (chains, n) [rad], (3, 3, chains, n)."""
-    xp, (first, second) = namespace(angle), PLANES[axis]
-    zero = 0.0 * angle
-    rows = [[zero, zero, zero] for _ in range(3)]
-    rows[axis][axis] = zero + 1.0
-    rows[first][first] = rows[second][second] = xp.cos(angle)
-    rows[second][first] = xp.sin(angle)
-    rows[first][second] = -rows[second][first]
-    return stacked([stacked(row) for row in rows])
+    """Rotations about a coordinate axis by angles (chains, n) [rad], (3, 3, chains, n); NumPy only."""
+    (first, second), rotation = PLANES[axis], np.zeros((3, 3, *angle.shape))
+    rotation[axis, axis] = 1.0
+    rotation[first, first] = rotation[second, second] = np.cos(angle)
+    rotation[second, first] = np.sin(angle)
+    rotation[first, second] = -rotation[second, first]
+    return rotation
 
 
 @dataclass(frozen=True)
@@ -84,8 +73,7 @@ class Chain(Constants):
     """Equally long chains side by side, such as two arms."""
 
     def __init__(self, chains: Sequence[Sequence[Body]]) -> None:
-        """`chains`: their bodies from the base outward. A body without a hinge is fixed to the one before it; the last
-        has one."""
+        """`chains`: bodies from the base outward; one without a hinge is fixed to the one before. The last has one."""
         links = [_links(chain) for chain in chains]
         self.length = len(links[0])
         self._axis, self._offset, self._turn = (

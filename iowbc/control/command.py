@@ -7,14 +7,8 @@ from iowbc.recipe.task.commands import CommandRates, Commands
 from iowbc.robot.description import Robot
 from iowbc.robot.mirror import VECTOR_SIGN, MirrorMap
 
-COMMAND = (
-    "v_x",
-    "v_y",
-    "yaw_rate",
-    "height",
-    "pitch",
-    *(f"{side}_{axis}" for side in ("left", "right") for axis in "xyz"),
-)
+WRISTS = tuple(f"{side}_{axis}" for side in ("left", "right") for axis in "xyz")
+COMMAND = ("v_x", "v_y", "yaw_rate", "height", "pitch", *WRISTS)
 """Names of the command's entries: m/s, m/s, rad/s, m, rad, and six wrist offsets in m; heading frame."""
 VELOCITY = slice(0, 3)
 YAW_RATE = 2

@@ -5,9 +5,8 @@ from pathlib import Path
 from zipfile import BadZipFile
 
 import numpy as np
-from numpy.typing import NDArray
 
-from iowbc.arrays import Array, Constants
+from iowbc.arrays import Array, Constants, Mask
 
 FEASIBLE = "feasible.npz"
 """File beside a fitted generator with its feasible map, to which the controller clamps commands."""
@@ -49,7 +48,7 @@ class FeasibleMap(Constants):
         pitch = np.array([-UPRIGHT, UPRIGHT])
         return cls(pitch, np.full(2, height), np.full(2, height))
 
-    def contains(self, height: Array, pitch: Array) -> NDArray[np.bool_]:
+    def contains(self, height: Array, pitch: Array) -> Mask:
         """True where commands are inside, shape (n,)."""
         clamped_height, clamped_pitch = self.clamp(height, pitch)
         return (clamped_height == height) & (clamped_pitch == pitch)
@@ -77,7 +76,7 @@ class FeasibleMap(Constants):
 
 
 def build_map(
-    pitches: Array, heights: Array, feasible: NDArray[np.bool_], slope: float, nominal: tuple[float, float]
+    pitches: Array, heights: Array, feasible: Mask, slope: float, nominal: tuple[float, float]
 ) -> FeasibleMap:
     """The map from a grid of feasibility flags (pitches, heights), with one run of heights at each pitch.
 
@@ -122,7 +121,7 @@ def _grow(run: Run, rows: list[list[Run]], place: float) -> list[Run]:
     return followed
 
 
-def _runs(row: NDArray[np.bool_]) -> list[Run]:
+def _runs(row: Mask) -> list[Run]:
     """First and last place of each run of True."""
     edges = np.diff(np.concatenate([[0], row.astype(np.int8), [0]]))
     starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1

@@ -21,10 +21,8 @@ def wants_to_move(command: Array, gait: GaitPrior) -> Mask:
 
 
 def is_falling(measured: Measured, pelvis_pitch: Array, recovery: Recovery) -> Mask:
-    """True where the base is tipping over; `pelvis_pitch` of the reference posture (n,) [rad], result (n,).
-
-    Pitch and roll of the measured gravity, less the reference's, and their rates by the gyroscope.
-    """
+    """True where the base is tipping over, (n,), by pitch and roll of the measured gravity, less the reference's, and
+    their rates by the gyroscope; `pelvis_pitch` of the reference posture (n,) [rad]."""
     xp, gravity, rate = namespace(pelvis_pitch), measured.projected_gravity, measured.base_angular_velocity
     pitch = gravity[:, 0] - xp.sin(pelvis_pitch) + recovery.horizon * rate[:, 1]
     roll = -gravity[:, 1] + recovery.horizon * rate[:, 0]

@@ -24,12 +24,7 @@ class ArmGravity(Constants):
         self._grip = robot.grip_offset.T[:, :, None]
 
     def torque(
-        self,
-        arms: Array,
-        waist: Array,
-        gravity: Array,
-        load: Array | None = None,
-        frames: Frames | None = None,
+        self, arms: Array, waist: Array, gravity: Array, load: Array | None = None, frames: Frames | None = None
     ) -> Array:
         """Motor torques that hold the arms still, (n, arms) [N·m], in the order of the interaction branch.
 

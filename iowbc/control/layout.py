@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise
 from typing import Any, Generic, TypeVar
 
 import numpy as np
@@ -58,9 +59,8 @@ class Layout(Generic[Source]):
 
     @cached_property
     def slices(self) -> dict[str, slice]:
-        sizes = [len(mirror) for mirror in self.mirrors]
-        ends = np.cumsum(sizes).tolist()
-        return {name: slice(end - size, end) for name, size, end in zip(self.names, sizes, ends, strict=True)}
+        ends = np.cumsum([0, *map(len, self.mirrors)]).tolist()
+        return {name: slice(*place) for name, place in zip(self.names, pairwise(ends), strict=True)}
 
     def describe(self) -> list[dict[str, Any]]:
         """Name, size, unit and frame of the parts, in order, for JSON."""
@@ -71,9 +71,6 @@ class Layout(Generic[Source]):
 
     def gather(self, source: Source, out: Row, which: NDArray[np.intp] | slice = EVERY) -> Row:
         """Fills rows (k, size) with the parts of some of the source's n environments."""
-        parts = [part.value(source) for part in self.parts]
-        if which is not EVERY:
-            parts = [values[which] for values in parts]
-        rows = len(out)
-        parts = [values if values.ndim == 2 else values.reshape(rows, -1) for values in parts]
+        parts = [part.value(source)[which] for part in self.parts]
+        parts = [values if values.ndim == 2 else values.reshape(len(out), -1) for values in parts]
         return np.concatenate(parts, axis=1, out=out)

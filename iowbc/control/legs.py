@@ -38,13 +38,6 @@ class Legs(Constants):
     """Direction of the hip yaw axis."""
     ankle_roll_z: Array
     """The ankle roll axis above the sole's centre."""
-    thigh_squared: Array
-    shank_squared: Array
-    """Squared lengths of thigh and shank [m²]."""
-    twice_product: Array
-    """Twice the product of their lengths [m²]."""
-    crooked: Array
-    """Angle that the shank makes with the thigh, positive bent back [rad]."""
 
 
 def leg_joints(robot: Robot) -> list[list[int]]:
@@ -68,17 +61,8 @@ def leg_geometry(robot: Robot) -> Legs:
     legs = [_vectors(robot, *pair) for pair in zip(robot.sole_bodies, robot.soles, strict=True)]
     both = {name: np.array([leg[name] for leg in legs]) for name in legs[0]}
     side, ankle_roll = both.pop("side")[:, 1], both.pop("ankle_roll")[:, 2]
-    thigh, shank = both["thigh"], both["shank"]
-    thigh_squared, shank_squared = (link[:, 0] * link[:, 0] + link[:, 2] * link[:, 2] for link in (thigh, shank))
-    return Legs(
-        side=side,
-        **{name: (vectors[:, 0], vectors[:, 2]) for name, vectors in both.items()},
-        ankle_roll_z=ankle_roll,
-        thigh_squared=thigh_squared,
-        shank_squared=shank_squared,
-        twice_product=2.0 * np.sqrt(thigh_squared * shank_squared),
-        crooked=np.arctan2(-shank[:, 0], -shank[:, 2]) - np.arctan2(-thigh[:, 0], -thigh[:, 2]),
-    )
+    pairs = {name: (vectors[:, 0], vectors[:, 2]) for name, vectors in both.items()}
+    return Legs(side=side, ankle_roll_z=ankle_roll, **pairs)
 
 
 def _vectors(robot: Robot, sole_body: str, sole: str) -> dict[str, Array]:

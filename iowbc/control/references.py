@@ -77,11 +77,8 @@ class ReferenceLayer(Constants):
         return changed
 
     def start(self, command: Array, grasp: Array) -> tuple[Array, Array]:
-        """References at the start of an episode, settled in the commanded posture, standing as the gait prior does.
-
-        command (n, 11); grasp (n, 2, 3): base grasp wrist positions, heading frame [m]; arms (n, arm joints),
-        support (n, support joints).
-        """
+        """References at the start of an episode, settled in the commanded posture, standing as the gait prior does:
+        arms (n, arm joints), support (n, support joints). `grasp` (n, 2, 3): of the wrists, heading frame [m]."""
         arms = self.default_arms + 0.0 * command[:, :1]
         target = self.wrist_target(self.support(arms, command), command, grasp)
         for _ in range(self._start.settling):
@@ -93,13 +90,7 @@ class ReferenceLayer(Constants):
         return arms, self.with_stride(support, command, rest, rest > 0.0)
 
     def advance(
-        self,
-        arms: Array,
-        support: Array,
-        command: Array,
-        grasp: Array,
-        dt: float,
-        frames: Frames | None = None,
+        self, arms: Array, support: Array, command: Array, grasp: Array, dt: float, frames: Frames | None = None
     ) -> tuple[Array, Array]:
         """References one control period later; shapes as in `start`. `frames` of `arms`, where they are known."""
         arms = self.arms.solve_step(arms, self.wrist_target(support, command, grasp), dt, frames)

@@ -22,34 +22,27 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Measured:
-    """Sensor measurements of n robots, one row each."""
+    """Sensor measurements of n robots, one row each: vectors (n, 3), `heading` (n, 1), joints (n, joints), and a
+    quaternion (n, 4). `heading` may drift slowly; an object's are needed where the policy observes it, its position
+    being zero without one."""
 
     projected_gravity: Annotated[
         Array, Quantity(polar_vector, "1", "base", "direction of gravity; (0, 0, -1) when upright")
     ]
-    """Direction of gravity in the base frame, (n, 3); (0, 0, -1) when upright."""
     base_angular_velocity: Annotated[Array, Quantity(axial_vector, "rad/s", "base", "gyroscope")]
-    """Base frame, (n, 3) [rad/s]."""
     heading: Annotated[Array, Quantity(turn, "rad", "world", "yaw of the base from any origin, by the inertial unit")]
-    """Yaw of the base as the inertial unit integrates it, from any origin, (n, 1) [rad]; it may drift slowly."""
     joint_position: Annotated[Array, Quantity(joint_mirror, "rad", "joint", "all joints, in the order of `joints`")]
-    """(n, joints) [rad]."""
     joint_velocity: Annotated[Array, Quantity(joint_mirror, "rad/s", "joint", "all joints, in the order of `joints`")]
-    """(n, joints) [rad/s]."""
     object_position: Annotated[Array | None, Quantity(polar_vector, "m", "base", "object's origin from the base")] = (
         None
     )
-    """Object from the base, base frame, (n, 3) [m]; needed where the policy observes the object, zero without one."""
     object_quaternion: Annotated[Array | None, Quantity(rotation, "1", "base", "object's orientation, wxyz")] = None
-    """Object's orientation in the base frame, wxyz, (n, 4)."""
     object_linear_velocity: Annotated[
         Array | None, Quantity(polar_vector, "m/s", "base", "object's velocity relative to the base")
     ] = None
-    """Object's velocity relative to the base, base frame, (n, 3) [m/s]."""
     object_angular_velocity: Annotated[
         Array | None, Quantity(axial_vector, "rad/s", "base", "object's angular velocity relative to the base")
     ] = None
-    """Object's angular velocity relative to the base, base frame, (n, 3) [rad/s]."""
 
     @property
     def pitch(self) -> Array:

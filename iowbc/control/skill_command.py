@@ -42,8 +42,7 @@ class SkillCommand:
         """Nominal command and scaled action (n, 11) in [-1, 1], within the ranges of training."""
         command: Array = nominal + self._scale * action
         command[:, VELOCITY] = command[:, VELOCITY].clip(self._low, self._high)
-        low, high = self._commands.height
-        command[:, HEIGHT] = command[:, HEIGHT].clip(low, high)
+        command[:, HEIGHT] = command[:, HEIGHT].clip(*self._commands.height)
         command[:, PITCH] = command[:, PITCH].clip(*self._commands.pitch)
         wrists = command[:, OFFSET].reshape(-1, 2, 3)
         shared = wrists.mean(axis=1, keepdims=True)

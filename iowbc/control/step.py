@@ -5,9 +5,9 @@ simulation computes the same equations with its own state (`iowbc.task.guidance`
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import Annotated, Any, get_type_hints
 
 import numpy as np
 
@@ -24,36 +24,30 @@ from iowbc.robot.description import Robot
 
 @dataclass(frozen=True)
 class State:
-    """State of n control loops between two steps: one row a robot, of the shapes in
-    `ControlStep.shapes`; units, frames and meaning in `STATE`."""
+    """State of n control loops between two steps, one row a robot: parts in the order of the packed state, with unit,
+    frame and meaning; shapes are in `ControlStep.shapes`."""
 
-    command: Array
-    arms: Array
-    posture: Array
-    heading_reference: Array
-    phase: Array
-    stepping: Array
-    feedback: Array
-    begun: Array
-    action: Array
-    history: Array
-
-
-STATE: Mapping[str, tuple[str, str, str]] = {
-    "command": ("m/s, m/s, rad/s, m, rad, m x 6", "heading", "command in force: rate-limited, and clamped to the map"),
-    "arms": ("rad", "joint", "θ_I_ref from differential IK, interaction order"),
-    "posture": ("rad", "joint", "θ_S_ref without the gait prior, support order"),
-    "heading_reference": ("rad", "world", "`heading` at the start plus the integrated yaw rate commanded"),
-    "phase": ("1", "-", "gait phase in [0, 1)"),
-    "stepping": ("1", "-", "1 while the gait clock runs, else 0"),
-    "feedback": (
+    command: Annotated[
+        Array, "m/s, m/s, rad/s, m, rad, m x 6", "heading", "command in force: rate-limited, and clamped to the map"
+    ]
+    arms: Annotated[Array, "rad", "joint", "θ_I_ref from differential IK, interaction order"]
+    posture: Annotated[Array, "rad", "joint", "θ_S_ref without the gait prior, support order"]
+    heading_reference: Annotated[Array, "rad", "world", "`heading` at the start plus the integrated yaw rate commanded"]
+    phase: Annotated[Array, "1", "-", "gait phase in [0, 1)"]
+    stepping: Annotated[Array, "1", "-", "1 while the gait clock runs, else 0"]
+    feedback: Annotated[
+        Array,
         "m, m, m, m, rad",
         "heading",
         "forward offset of left foot, right foot and both; stretch of both legs; turn of both hips",
-    ),
-    "begun": ("1", "-", "0 in the state that settle.onnx makes, 1 afterwards"),
-    "action": ("action", "joint", "residual action that the motors follow, support order"),
-    "history": ("SI", "-", "the last observations, oldest first"),
+    ]
+    begun: Annotated[Array, "1", "-", "0 in the state that settle.onnx makes, 1 afterwards"]
+    action: Annotated[Array, "action", "joint", "residual action that the motors follow, support order"]
+    history: Annotated[Array, "SI", "-", "the last observations, oldest first"]
+
+
+STATE: Mapping[str, tuple[str, str, str]] = {
+    name: hint.__metadata__ for name, hint in get_type_hints(State, include_extras=True).items()
 }
 """Unit, frame and meaning of each part of the state, in its order in the packed one."""
 
@@ -168,4 +162,4 @@ class ControlStep(Constants):
 
     @property
     def sizes(self) -> dict[str, int]:
-        return {name: int(np.prod(self.shapes[name])) for name in (field.name for field in fields(State))}
+        return {name: int(np.prod(shape)) for name, shape in self.shapes.items()}

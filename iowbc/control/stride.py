@@ -27,6 +27,10 @@ class Stride(Constants):
         self._joints = [list(pair) for pair in zip(*leg_joints(robot), strict=True)]
         """Places of each joint of the legs, left and right, among the support joints."""
         self._settings, self.legs, self._held = settings, leg_geometry(robot), float(held)
+        self._thigh_squared, self._shank_squared = (x * x + z * z for x, z in (self.legs.thigh, self.legs.shank))
+        self._twice_product = 2.0 * np.sqrt(self._thigh_squared * self._shank_squared)
+        self._crooked = _forward(*self.legs.shank) - _forward(*self.legs.thigh)
+        """κ, positive bent back [rad]."""
         self._spread = settings.spread * np.sign(self.legs.side)
         """Lateral offset of each sole from its place in the posture, positive to the left, (2,) [m]."""
         moved = [joint for pair in self._joints for joint in pair]
@@ -91,10 +95,9 @@ class Stride(Constants):
 
         d² = l₁² + l₂² + 2 l₁l₂ cos(knee + κ) for links that make the angle κ with the knee at zero.
         """
-        legs = self.legs
-        cosine = (x * x + z * z - legs.thigh_squared - legs.shank_squared) / legs.twice_product
-        knee = namespace(x).arccos(cosine.clip(-1.0, float(np.cos(self._settings.straightest_knee)))) - legs.crooked
-        return knee, _forward(x, z) - _forward(*_ankle(legs, knee))
+        cosine = (x * x + z * z - self._thigh_squared - self._shank_squared) / self._twice_product
+        knee = namespace(x).arccos(cosine.clip(-1.0, float(np.cos(self._settings.straightest_knee)))) - self._crooked
+        return knee, _forward(x, z) - _forward(*_ankle(self.legs, knee))
 
 
 def travel(foot: Array, swing: Array, stance: float) -> Array:

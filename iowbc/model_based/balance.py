@@ -48,13 +48,12 @@ class Balance:
         self._cone, self._bound = np.kron(np.eye(2), cone), np.tile(bound, 2)
         support = robot.support.tolist()
         places = [[support.index(joint) for joint in pair] for pair in robot.linkages]
-        self._pairs = np.zeros((2 * len(places), self.joints))
-        for row, (first, second) in enumerate(places):
-            self._pairs[2 * row : 2 * row + 2, [first, second]] = [[1.0, 1.0], [1.0, -1.0]]
+        unit = np.eye(self.joints)
+        pairs = [unit[first] + sign * unit[second] for first, second in places for sign in (1.0, -1.0)]
+        self._selection = np.array([*unit, *pairs])
         single, shared = self.support.effort.copy(), self.support.effort[[first for first, _ in places]]
         single[[joint for pair in places for joint in pair]] *= settings.linkage_share
         self._effort = np.concatenate([single, np.repeat(shared, 2)])
-        self._selection = np.concatenate([np.eye(self.joints), self._pairs])
 
     def configuration(self, gravity: Array, joints: Array) -> Array:
         """Model configuration, (22,), in a frame with the base's heading and its origin midway between the soles.
@@ -120,11 +119,9 @@ class Balance:
     def _tasks(self, q: Array, v: Array, sample: Sample, reference: Array) -> tuple[list[Array], list[Array]]:
         """Weighted rows and residuals of centre of mass, height, torso and posture."""
         settings, support, model, data, nv = self.settings, self.support, self.model, self.data, self.velocities
-        base, torso = self._jacobian(support.base), self._jacobian(support.torso)
-        lift, turn = (
-            pinocchio.getFrameClassicalAcceleration(model, data, frame, WORLD)
-            for frame in (support.base, support.torso)
-        )
+        frames = support.base, support.torso
+        base, torso = map(self._jacobian, frames)
+        lift, turn = (pinocchio.getFrameClassicalAcceleration(model, data, frame, WORLD) for frame in frames)
         pinocchio.centerOfMass(model, data, q, v, np.zeros(nv))
         com, speed, drift = data.com[0][:2].copy(), data.vcom[0][:2].copy(), data.acom[0][:2].copy()
         tasks = (

@@ -2,9 +2,8 @@
 
 import numpy as np
 import pinocchio
-from numpy.typing import NDArray
 
-from iowbc.arrays import Array
+from iowbc.arrays import Array, Mask
 from iowbc.control.action import action_scale
 from iowbc.control.command import HEIGHT, PITCH
 from iowbc.control.observation import observation_layout
@@ -31,14 +30,14 @@ class ModelPolicy:
         self._motion = self._filter(0)
         self._starts = np.ones(0, np.bool_)
 
-    def reset(self, which: NDArray[np.bool_]) -> None:
+    def reset(self, which: Mask) -> None:
         """Reset the marked environments, shape (n,)."""
         if self._starts.shape != which.shape:
             self._starts = np.ones(which.shape, np.bool_)
             self._motion = self._filter(len(which))
         self._starts |= which
 
-    def act(self, observation: NDArray[np.float32], privileged: NDArray[np.float32]) -> NDArray[np.float32]:
+    def act(self, observation: Array, privileged: Array) -> Array:
         """Residual action, shape (n, A), from s_t, shape (n, S). Rows of zeros, which belong to no trial, stay zero."""
         del privileged
         rows = observation.astype(np.float64)

@@ -10,9 +10,6 @@ from iowbc.control.generator import ReferenceNetwork
 from iowbc.reference.labels.dataset import Dataset
 from iowbc.reference.labels.plan import SamplePlan
 
-ARMS_COLLIDE = "arms collide"
-"""Reason for rejection that does not depend on height and pitch."""
-
 
 @dataclass(frozen=True)
 class LabelledRegion:
@@ -41,25 +38,20 @@ def measure_labelled_region(plan: SamplePlan, dataset: Dataset) -> LabelledRegio
     found = np.zeros(plan.grid_shape, dtype=bool)
     found.ravel()[dataset.index[on_grid] - plan.drawn] = True
     held: Mask = np.any(found, axis=0, keepdims=False)
-    relevant = dataset.rejected_reason != ARMS_COLLIDE
+    relevant = dataset.rejected_reason != "arms collide"  # which does not depend on height and pitch
     kept = _around(plan, dataset.command[~on_grid])
     tried = kept + _around(plan, dataset.rejected_command[relevant & (dataset.rejected_index < plan.drawn)])
     enough = tried >= recipe.enough
     share = np.where(enough, kept / np.maximum(tried, 1), -1.0)
     feasible = held & (~enough | (share >= recipe.kept_share))
-    return LabelledRegion(
-        build_map(plan.pitches, plan.heights, feasible, recipe.bound_slope, plan.nominal), held, share
-    )
+    outline = build_map(plan.pitches, plan.heights, feasible, recipe.bound_slope, plan.nominal)
+    return LabelledRegion(outline, held, share)
 
 
 def measure_smooth_region(plan: SamplePlan, held: FeasibleMap, network: ReferenceNetwork, arms: Array) -> SmoothRegion:
-    """Part of a map where the network moves smoothly with height and pitch, for arms (n, 14).
-
-    Raises ValueError if it is empty.
-    """
+    """Part of a map where the network moves smoothly, for arms (n, 14). Raises ValueError if it is empty."""
     recipe, smooth = plan.recipe.feasible, plan.recipe.fit.smoothness
-    chosen = np.linspace(0, len(arms) - 1, min(recipe.arms, len(arms))).astype(int)
-    arms = arms[chosen]
+    arms = arms[np.linspace(0, len(arms) - 1, min(recipe.arms, len(arms))).astype(int)]
     jump = np.empty((len(plan.pitches), len(plan.heights)))
 
     def reference(height: float, pitch: float) -> Array:

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -54,20 +55,13 @@ class Admission:
 
 
 def admissions(
-    specification: Specification,
-    student: Student,
-    *,
-    trials: int,
-    workers: int,
-    tasks: Sequence[str] = (),
+    specification: Specification, student: Student, *, trials: int, workers: int, tasks: Sequence[str] = ()
 ) -> list[Admission]:
     """Runs every task, or only `tasks`, with each scripted pair: `trials` episodes each, with the same seeds."""
     names = tuple(tasks) or specification.recipe.skill.tasks.names
     plans = [
         Plan(name, human, True, seed=seed, rule=rule)
-        for name in names
-        for human, rule in PAIRS.values()
-        for seed in range(trials)
+        for name, (human, rule), seed in product(names, PAIRS.values(), range(trials))
     ]
     with closing(TransportGame(specification, student, n=len(plans), workers=workers, plans=plans)) as game:
         figures = play_once(game, NOMINAL)

@@ -1,6 +1,7 @@
-"""Games of one process: decisions of robot and human, their control steps, rewards and endings."""
+"""Games of one process, built from a `GameSetup`: decisions of robot and human, control steps, rewards and endings."""
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -8,23 +9,24 @@ from iowbc import counter_random as random
 from iowbc.arrays import Array, Indices, Keys, Mask
 from iowbc.control.hand_forces import HandForces
 from iowbc.control.skill_observation import YAW, joined, of_object, robot_observation
+from iowbc.errors import UsageError, require_known
+from iowbc.recipe.skill.skill import Skill
+from iowbc.recipe.skill.task import TransportTask
 from iowbc.rollouts.blocks import block_size
 from iowbc.sim.shapes import measured as shape_of
 from iowbc.skill import observation as seen
 from iowbc.skill.figures import FIGURES, EpisodeFigures, internal_force
 from iowbc.skill.human import Human
-from iowbc.skill.lower_layer import LowerLayer
-from iowbc.skill.nominal_command import NominalCommand
-from iowbc.skill.object_motion import ObjectMotion, open_loop_motion, pursue
+from iowbc.skill.lower_layer import LowerLayer, Student
+from iowbc.skill.object_motion import NominalCommand, ObjectMotion, open_loop_motion, pursue
 from iowbc.skill.path import Paths
-from iowbc.skill.plan import CLOCK, KINDS, PERSON, RULES, EpisodeDraws
+from iowbc.skill.plan import CLOCK, KINDS, PERSON, RULES, EpisodeDraws, Plan
 from iowbc.skill.reward import GameEnding, ending, potential, reward
 from iowbc.skill.situation import GameState, Origin, situation, turned
 from iowbc.task.episodes import Episode
-from iowbc.task.vector.shared import Buffers
-
-if TYPE_CHECKING:
-    from iowbc.skill.setup import GameSetup
+from iowbc.task.specification import Specification
+from iowbc.task.vector.setup import scene_of
+from iowbc.task.vector.shared import Buffers, Fields
 
 NO_LIMIT = 1e6
 """Time limit of the lower layer's episodes [s]: the game ends them."""
@@ -34,10 +36,78 @@ CORNERS = np.array([[1.0, 1.0], [1.0, -1.0], [-1.0, -1.0], [-1.0, 1.0]])
 ROBOT_ACTIONS, HUMAN_ACTIONS = 11, 5
 
 
+@dataclass(frozen=True)
+class GameSetup:
+    """All games of a `TransportGame`."""
+
+    specification: Specification
+    student: Student
+    """The controller below the games."""
+    count: int
+    """Number of games."""
+    seed: int
+    partners: tuple[str, ...]
+    """Humans to sample in games without a plan."""
+    plans: tuple[Plan, ...] | None = None
+    """One per game; without plans, tasks and humans are sampled."""
+
+    def __post_init__(self) -> None:
+        """Raises UsageError for an unknown task or human, or a wrong number of plans or games."""
+        if self.count < 1 or (self.plans is not None and len(self.plans) != self.count):
+            found = "no games" if self.plans is None else f"{len(self.plans)} plans for {self.count} games"
+            raise UsageError(f"{found}: give each of one or more games its plan")
+        for kind in (*self.partners, *(plan.partner for plan in self.plans or ())):
+            require_known(kind, "human", KINDS)
+        for plan in self.plans or ():
+            require_known(plan.task, "transport task", self.skill.tasks.names)
+
+    @property
+    def skill(self) -> Skill:
+        return self.specification.recipe.skill
+
+    @cached_property
+    def tasks(self) -> dict[str, TransportTask]:
+        return {name: getattr(self.skill.tasks, name) for name in self.skill.tasks.names}
+
+    @cached_property
+    def scenes(self) -> list[str]:
+        """Name of each game's scene."""
+        if self.plans is not None:
+            return [self.tasks[plan.task].scene for plan in self.plans]
+        weights: dict[str, float] = {}
+        for task in self.tasks.values():
+            weights[task.scene] = weights.get(task.scene, 0.0) + task.weight
+        return scene_of(self.count, weights.items())
+
+    def keys(self, first: int, last: int) -> Keys:
+        """Random keys of some games, (k,)."""
+        key = random.environment_key(self.seed, np.arange(first, last))
+        for row, plan in enumerate(self.plans[first:last] if self.plans is not None else ()):
+            if plan.seed is not None:
+                key[row] = random.environment_key(plan.seed, np.zeros(1, np.int64))[0]
+        return key
+
+    def buffer_fields(self) -> Fields:
+        """Buffers that games and learner share."""
+        sizes = {f"{time}/{name}": size for time in ("now", "final") for name, size in seen.sizes(self.skill)}
+        sizes |= {"action/robot": ROBOT_ACTIONS, "action/human": HUMAN_ACTIONS, "privileged_action": ROBOT_ACTIONS}
+        return {
+            **{name: ((size,), "float32") for name, size in sizes.items()},
+            "reward": ((), "float32"),
+            **dict.fromkeys(("terminated", "truncated", "human_acts"), ((), "bool")),
+            "figures": ((len(FIGURES),), "float64"),
+            "counters": ((1,), "float64"),
+        }
+
+    def batch(self, first: int, last: int, buffers: Buffers) -> "GameBatch":
+        """The games from `first` to `last` (excluded)."""
+        return GameBatch(self, first, last, buffers)
+
+
 class GameBatch:
     """n games. `reset` and `step` read the actions from the buffers and write all results to them."""
 
-    def __init__(self, setup: "GameSetup", first: int, last: int, buffers: Buffers) -> None:
+    def __init__(self, setup: GameSetup, first: int, last: int, buffers: Buffers) -> None:
         """Games from `first` to `last` (excluded); `buffers` hold only their rows."""
         recipe, self._skill = setup.specification.recipe, setup.skill
         self.buffers, self._games, self._keys = buffers, np.arange(first, last), setup.keys(first, last)
@@ -75,8 +145,7 @@ class GameBatch:
         """The games after the last control step."""
 
     def reset(self, seeds: Keys | None = None, agent_share: float = 0.0) -> None:
-        """Starts the first episode of every game, the same each time; seeds (n,) reseed all random draws.
-        `agent_share`: fraction of the sampled episodes from now on in which the human agent acts."""
+        """See `TransportGame.reset`; seeds (n,) reseed all random draws."""
         self.drawn.agent_share = agent_share
         if seeds is not None:
             self._keys = random.environment_key(seeds, np.zeros(self.n, np.int64))
@@ -125,18 +194,12 @@ class GameBatch:
         memory, guidance = lower.memory, lower.guidance
         target = guidance.references.wrist_target(memory.posture, memory.command, guidance.grasp)
         self._wrist_error = wrists - target
-        end = ending(
-            self._skill,
-            self.now,
-            held=held,
-            happened=(lower.fallen, lower.dropped, lower.diverged),
-            late=self._decisions >= self._limit[self.drawn.task],
-        )
+        happened, late = (lower.fallen, lower.dropped, lower.diverged), self._decisions >= self._limit[self.drawn.task]
+        end = ending(self._skill, self.now, held=held, happened=happened, late=late)
         touched = self._in_wall()
         before, self._potential = self._potential, potential(self._skill, self.now, held)
-        buffers["reward"][:] = reward(
-            self._skill, self._potential - before, end, self._costs * lower.period, self._jerk, touched
-        )
+        gained, costs = self._potential - before, self._costs * lower.period
+        buffers["reward"][:] = reward(self._skill, gained, end, costs, self._jerk, touched)
         self._total += buffers["reward"]
         self._touched += touched
         buffers["terminated"][:], buffers["truncated"][:] = end.terminated, end.time_out
@@ -197,9 +260,8 @@ class GameBatch:
         return np.where(self.drawn.acts[:, None], acting, scripted)
 
     def _open_loop_motion(self, pace: Array | float) -> ObjectMotion:
-        return open_loop_motion(
-            self._skill.pursuit, self.paths, self.now, self._decisions / self._skill.frequency, pace
-        )
+        seconds = self._decisions / self._skill.frequency
+        return open_loop_motion(self._skill.pursuit, self.paths, self.now, seconds, pace)
 
     def _costs_now(self) -> Array:
         """Internal force [N], absolute power of the human beyond its share [W] and tilt [rad], (3, n)."""
@@ -230,16 +292,14 @@ class GameBatch:
 
     def _observe(self) -> None:
         lower, drawn, now, ahead = self.lower, self.drawn, self.now, self._skill.pursuit.waypoints
-        path = seen.waypoints(self.paths, now, ahead, now.heading)
+        path, human_path = (seen.waypoints(self.paths, now, ahead, frame) for frame in (now.heading, now.yaw))
         thing = of_object(lower.simulation.measured, self._sees_object)
         robot = robot_observation(
             *(lower.memory.command, lower.simulation.measured, self._wrist_error, thing),
             *(self._pushing, drawn.known, path, self._felt),
         )
         force = self.origin.turned(lower.simulation.state.partner_force)
-        felt = seen.human_observation(
-            now, force, self._action["human"], seen.waypoints(self.paths, now, ahead, now.yaw)
-        )
+        felt = seen.human_observation(now, force, self._action["human"], human_path)
         left = (self._limit[drawn.task] - self._decisions) / self._skill.frequency
         secret = seen.hidden(lower.simulation, lower.moved, left, drawn.acts)
         human = joined(felt)

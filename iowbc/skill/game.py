@@ -8,12 +8,11 @@ import numpy as np
 from iowbc.arrays import Array, Keys, Mask
 from iowbc.errors import Interrupted
 from iowbc.learning.networks import TeacherNetwork
-from iowbc.skill.batch import GameBatch
+from iowbc.skill.batch import GameBatch, GameSetup
 from iowbc.skill.figures import FIGURES
 from iowbc.skill.lower_layer import Student
 from iowbc.skill.observation import sizes
 from iowbc.skill.plan import KINDS, Plan
-from iowbc.skill.setup import GameSetup
 from iowbc.skill.trained import mean_actions
 from iowbc.task.specification import Specification
 from iowbc.task.vector.worker import Message
@@ -73,17 +72,15 @@ class TransportGame:
         partners: Sequence[str] | None = None,
         plans: Sequence[Plan] | None = None,
     ) -> None:
-        """`workers`: number of processes; 0 runs the games in this one. `partners`: humans to sample, by default those
-        of training. `plans`: one per game instead of sampling. Raises UsageError for an unknown task or human,
-        WorkerFailed if a worker dies or hangs."""
+        """`workers`: processes; 0 runs the games here. `partners`: humans to sample, those of training by default.
+        `plans`: one per game instead. Raises UsageError for an unknown name, WorkerFailed if a worker dies or hangs."""
         skill = specification.recipe.skill
         drawn = skill.partners.training if partners is None else partners
         planned = None if plans is None else tuple(plans)
         self.setup = GameSetup(specification, student, n, seed, tuple(drawn), planned)
         self.n, self.decision_rate = n, skill.frequency
-        found = dict(sizes(skill))
-        self.state_size = found.pop("state")
-        self.observation_sizes = found
+        self.observation_sizes = dict(sizes(skill))
+        self.state_size = self.observation_sizes.pop("state")
         self._workers: Workers = WorkerProcesses(self.setup, workers, PATIENCE) if workers else InProcess(self.setup)
         self._buffers = self._workers.buffers
         self.action_sizes = {agent: self._buffers[f"action/{agent}"].shape[1] for agent in self.agents}
@@ -113,8 +110,7 @@ class TransportGame:
         return self._observed("now")
 
     def step(self, actions: Mapping[str, Array]) -> GameOutcome:
-        """One decision; actions by agent, (n, k) in [-1, 1]. Raises ValueError for a wrong shape or values that are not
-        finite."""
+        """One decision; actions by agent, (n, k) in [-1, 1]. Raises ValueError if not finite or of another shape."""
         self.act(actions)
         self._ask([Message.of(GameBatch.step)] * len(self._workers.groups))
         return self.outcome()
@@ -130,16 +126,9 @@ class TransportGame:
 
     def outcome(self) -> GameOutcome:
         """Result of the last decision."""
-        buffers = self._buffers
-        terminated, truncated = buffers["terminated"].copy(), buffers["truncated"].copy()
-        return GameOutcome(
-            observed=self._observed("now"),
-            reward=buffers["reward"].copy(),
-            terminated=terminated,
-            truncated=truncated,
-            final=self._observed("final"),
-            figures=self._figures(np.flatnonzero(terminated | truncated)),
-        )
+        reward, terminated, truncated = (self._buffers[name].copy() for name in ("reward", "terminated", "truncated"))
+        figures = self._figures(np.flatnonzero(terminated | truncated))
+        return GameOutcome(self._observed("now"), reward, terminated, truncated, self._observed("final"), figures)
 
     def close(self) -> None:
         self._workers.close()
@@ -161,12 +150,9 @@ class TransportGame:
 
 
 def play_once(
-    game: TransportGame,
-    networks: Mapping[str, TeacherNetwork | None],
-    interrupted: Callable[[], bool] = lambda: False,
+    game: TransportGame, networks: Mapping[str, TeacherNetwork | None], interrupted: Callable[[], bool] = lambda: False
 ) -> dict[str, Array]:
-    """Metrics of the first episode of every game, (n,) by name, in the order of the games, with the policies' mean
-    actions; see `mean_actions`. Raises Interrupted once `interrupted()` is true."""
+    """Metrics of every game's first episode, (n,) by name, with `mean_actions`. Raises Interrupted if asked to."""
     observed, decision = game.reset(), 0
     rows: dict[int, dict[str, Array]] = {}
     while len(rows) < game.n:

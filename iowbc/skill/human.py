@@ -25,8 +25,7 @@ class Human:
 
     def of_action(self, action: Array, now: GameState) -> Array:
         """Intentions that actions add to the script's, (n, 5): velocity [m/s], yaw rate [rad/s], height offset [m].
-        `action` (n, 5) in [-1, 1]: velocity of the handle in the frame of the object's yaw, height offset, yaw rate of
-        the object."""
+        `action` (n, 5) in [-1, 1]: handle's velocity in the frame of the object's yaw, height offset, yaw rate."""
         s = self._settings
         scaled = action * np.array([s.velocity, s.velocity, s.vertical_velocity, s.height, s.yaw_rate])
         return np.concatenate([turned(scaled[:, :3], now.yaw), scaled[:, 4:], scaled[:, 3:4]], axis=1)

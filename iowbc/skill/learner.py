@@ -2,13 +2,12 @@
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
+from iowbc.arrays import Array, Indices
 from iowbc.learning import checkpoint
 from iowbc.learning.checkpoint import Arrays, prefixed, under
 from iowbc.learning.gaussian import divergence, entropy, log_density
@@ -18,9 +17,6 @@ from iowbc.learning.rollout import advantages
 from iowbc.recipe.skill.skill import SkillLearning
 from iowbc.skill.game import HUMAN, ROBOT, Observed, TransportGame
 from iowbc.skill.trained import Trained, mean_actions
-
-Array = NDArray[np.float32]
-
 
 IMITATION_BATCH = 1024
 """Batch size of the imitation, sampled from all data so far."""
@@ -37,8 +33,7 @@ class SkillTraining:
         torch.manual_seed(seed)
         self.settings, self.game, self.seed = settings, game, seed
         self.steps, self.planned = 0, settings.steps
-        sizes = game.observation_sizes
-        rate = settings.learning_rate
+        sizes, rate = game.observation_sizes, settings.learning_rate
         self.agents = {
             name: Trained(sizes[name], game.action_sizes[name], settings, 0.0, rate) for name in (ROBOT, HUMAN)
         }
@@ -79,9 +74,9 @@ class SkillTraining:
         self.critic.normalization.discounted[:] = 0.0
         seeds = np.random.default_rng([self.seed, self.steps]).integers(2**63, size=game.n, dtype=np.uint64)
         observed = game.reset(seeds, self.agent_share)
-        kept: dict[str, list[NDArray[Any]]] = defaultdict(list)
-        cut: list[tuple[int, NDArray[np.int64], Array]] = []
-        episodes: list[dict[str, NDArray[Any]]] = []
+        kept: dict[str, list[Array]] = defaultdict(list)
+        cut: list[tuple[int, Indices, Array]] = []
+        episodes: list[dict[str, Array]] = []
         for step in range(settings.rollout):
             now = {**observed.observations, "critic": self._judged(observed)}
             now |= {"learnt": game.human_acts.copy(), "privileged": game.privileged_actions}
@@ -161,11 +156,8 @@ class SkillTraining:
         return explained | figures
 
     def _batches(self, count: int) -> list[Tensor]:
-        return [
-            places
-            for _ in range(self.settings.epochs)
-            for places in torch.randperm(count).chunk(self.settings.minibatches)
-        ]
+        epochs, parts = self.settings.epochs, self.settings.minibatches
+        return [places for _ in range(epochs) for places in torch.randperm(count).chunk(parts)]
 
     def _improve(self, names: Sequence[str], samples: Mapping[str, Tensor]) -> dict[str, float]:
         """Gradient steps of these policies; with HAPPO, the factor is then multiplied by their probability ratios."""
@@ -200,9 +192,8 @@ class SkillTraining:
     def _loss(self, agent: Trained, own: Mapping[str, Tensor], advantage: Tensor) -> tuple[Tensor, float]:
         """PPO's clipped loss of a policy, and the share of samples that are clipped."""
         clip = self.settings.clip
-        ratio = torch.exp(
-            log_density(own["action"], agent.network.body(own["input"]), agent.log_std) - own["log_density"]
-        )
+        density = log_density(own["action"], agent.network.body(own["input"]), agent.log_std)
+        ratio = torch.exp(density - own["log_density"])
         loss = -torch.min(advantage * ratio, advantage * torch.clamp(ratio, 1.0 - clip, 1.0 + clip)).mean()
         share = float(((ratio.detach() - 1.0).abs() > clip).float().mean())
         return loss - self.settings.entropy * entropy(agent.log_std), share
@@ -251,7 +242,7 @@ class SkillTraining:
             whole |= prefixed(name, each.arrays())
         return whole
 
-    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+    def restore(self, arrays: Mapping[str, Array]) -> None:
         for name, each in self.trained.items():
             each.restore(under(name, arrays))
         self.steps = int(arrays["steps"][0])
@@ -259,15 +250,13 @@ class SkillTraining:
         checkpoint.restore_random(under("random", arrays))
 
 
-def _of_episodes(ended: Sequence[Mapping[str, NDArray[Any]]]) -> dict[str, float]:
+def _of_episodes(ended: Sequence[Mapping[str, Array]]) -> dict[str, float]:
     """Means over the ended episodes, by kind of human."""
     columns = {name: np.concatenate([np.asarray(each[name]) for each in ended]) for name in ended[0]}
     columns = {name: values.astype(np.float64) for name, values in columns.items() if values.dtype.kind in "fib"}
     learnt = columns.pop("learnt") > 0.0
-    kinds = {"scripted": ~learnt, "learnt": learnt}
-    return {
-        f"{kind}/{name}": float(values[of].mean())
-        for kind, of in kinds.items()
-        if of.any()
-        for name, values in columns.items()
-    }
+    means: dict[str, float] = {}
+    for kind, of in (("scripted", ~learnt), ("learnt", learnt)):
+        if of.any():
+            means |= {f"{kind}/{name}": float(values[of].mean()) for name, values in columns.items()}
+    return means

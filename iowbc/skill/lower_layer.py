@@ -60,8 +60,7 @@ class LowerLayer(Batch):
         self.fallen, self.dropped, self.diverged = np.zeros((3, self.n), np.bool_)
         """Events since the episode began, (n,)."""
         self.human = np.zeros((self.n, 4))
-        """Intentions of humans: velocity of the handle and yaw rate of the object, start frame [m/s, rad/s], and height
-        of the handle [m], (n, 4)."""
+        """Intentions of humans, start frame, (n, 4): handle's velocity [m/s], object's yaw rate [rad/s], height [m]."""
         self._student, self._block = student.policy, block
         self._history = History(self.n, student.history, student.observation)
         self._starts = np.ones(self.n, np.bool_)

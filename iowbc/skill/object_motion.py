@@ -1,13 +1,17 @@
-"""Desired motion of the object along its path, closed loop or by the clock."""
+"""Desired motion of the object along its path, closed loop or by the clock, and commands of a robot that follows it."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from iowbc.arrays import Array
-from iowbc.recipe.skill.skill import PathFollowing
+from iowbc.arrays import Array, Mask
+from iowbc.control.command import HEIGHT, OFFSET, YAW_RATE
+from iowbc.control.skill_command import SkillCommand
+from iowbc.recipe.skill.skill import PathFollowing, Skill
+from iowbc.recipe.task.commands import Commands
+from iowbc.robot.rotations import wrapped
 from iowbc.skill.path import Paths
-from iowbc.skill.situation import GameState
+from iowbc.skill.situation import GameState, turned
 
 
 @dataclass(frozen=True)
@@ -50,3 +54,29 @@ def _along(
         heading=heading,
         height=paths.height(now.path, covered + settings.ahead),
     )
+
+
+class NominalCommand(SkillCommand):
+    """Nominal commands of n robots, (n, 11), which know the path or follow."""
+
+    def __init__(self, skill: Skill, commands: Commands, pushing: Mask) -> None:
+        super().__init__(skill.robot, commands, pushing)
+        self._pursuit = skill.pursuit
+
+    def leading(self, wanted: ObjectMotion, now: GameState) -> Array:
+        """Commands for the desired motion of the object; the base circles the object's centre as it turns.
+
+        v_base = v_object - ω × (object - base), in the heading frame. The hands rise by the path's height plus the
+        object's height error.
+        """
+        command = self.standing()
+        rate = wanted.yaw_rate + self._pursuit.yaw * wrapped(wanted.heading - now.heading)
+        command[:, :YAW_RATE] = turned(wanted.velocity, -now.heading)
+        arm = turned(now.position[:, :2] - now.base[:, :2], -now.heading)
+        command[:, 0] += rate * arm[:, 1]
+        command[:, 1] -= rate * arm[:, 0]
+        command[:, YAW_RATE] = rate
+        height = command[:, HEIGHT] + (2.0 * wanted.height - now.position[:, 2]) * ~self._pushing
+        command[:, HEIGHT] = height.clip(*self._commands.height)  # the legs as far as possible, then the arms
+        command[:, OFFSET][:, 2::3] += (height - command[:, HEIGHT])[:, None]
+        return command

@@ -21,8 +21,7 @@ HIDDEN = 13 + len(BEHAVIOURS) + len(DRAWN)
 
 
 def sizes(skill: Skill) -> tuple[tuple[str, int], ...]:
-    """Sizes of the observations of "robot" and "human", and of the centralised critic's "state": both, and what is
-    hidden from them."""
+    """Sizes of the observations of "robot" and "human", and of the critic's "state": both, and what they do not see."""
     robot = SENSED + 6 * skill.robot.history
     return ("robot", robot), ("human", FELT), ("state", robot + FELT + HIDDEN)
 

@@ -57,16 +57,14 @@ class EpisodeDraws:
         goal_known: float,
         plans: Sequence[Plan] | None,
     ) -> None:
-        """`scenes`: one per game; `partners`: humans to sample; `goal_known`: probability that the robot knows the
-        path; `plans`: one per game."""
+        """`scenes`, `plans`: one per game; `partners`: humans to sample; `goal_known`: chance to know the path."""
         n, own = len(scenes), list(tasks.values())
         self._goal_known, self._plans, self.agent_share = goal_known, plans, 0.0
         self._kinds = np.array([KINDS.index(kind) for kind in partners])
         chances = np.array([[task.weight * (task.scene == scene) for task in own] for scene in scenes])
         self._tasks = np.cumsum(chances, axis=1) / chances.sum(axis=1, keepdims=True)
         self._mass, self._share = (np.array([getattr(task, name) for task in own]) for name in ("mass", "share"))
-        resistance = [np.nan if task.rolling_resistance is None else task.rolling_resistance for task in own]
-        self._resistance = np.array(resistance)
+        self._resistance = np.array([task.rolling_resistance for task in own], np.float64)
         self.task, self.kind, self.rule = np.zeros((3, n), np.int64)
         """Number of the task, of the human among `KINDS`, of the nominal command among `RULES`, (n,)."""
         self.pace = np.ones(n)

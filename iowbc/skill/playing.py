@@ -19,11 +19,8 @@ def show_game(game: SingleGame) -> None:
 
 
 def film_game(game: SingleGame, path: Path, title: str, progress: Callable[[float, float], None]) -> int:
-    """Play a game from its beginning to an mp4 file, without a display; returns the number of frames.
-
-    `title`: text in every frame, above the line with time, way, force and command; `progress` receives the rendered and
-    the longest duration [s]. Raises NoRenderer.
-    """
+    """Play a game from its beginning to an mp4 file, without a display; returns the number of frames. `title`: in every
+    frame; `progress` receives the rendered and the longest duration [s]. Raises NoRenderer."""
     video = game.recipe.eval.video.model_copy(update={"duration": game.duration})
     with (
         written_film(path, video.fps) as add,

@@ -32,8 +32,7 @@ class GameEnding:
 
 
 def ending(skill: Skill, now: GameState, *, held: Mask, happened: tuple[Mask, Mask, Mask], late: Mask) -> GameEnding:
-    """Endings of games, (n,) each. `held`: object in the hands; `happened`: falls, drops and divergence; `late`: past
-    the time limit."""
+    """Endings, (n,) each. `held`: object in the hands; `happened`: falls, drops, divergence; `late`: past the limit."""
     finish = skill.finish
     fallen, dropped, diverged = happened
     reached = (now.left < finish.distance) & (np.abs(now.lateral) < finish.lateral)

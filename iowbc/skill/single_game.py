@@ -24,19 +24,14 @@ class SingleGame:
     """One game, at its beginning. Close it."""
 
     def __init__(
-        self,
-        world: Specification,
-        student: Student,
-        networks: Mapping[str, TeacherNetwork | None],
-        plan: Plan,
+        self, world: Specification, student: Student, networks: Mapping[str, TeacherNetwork | None], plan: Plan
     ) -> None:
         """`networks`: policies of the agents, see `mean_actions`. Raises UsageError for an unknown task."""
         self._game, self._networks = TransportGame(world, student, n=1, plans=(plan,)), networks
         self.recipe = world.recipe
         self.duration = self._game.setup.tasks[plan.task].duration
         """Time limit [s]."""
-        self.batch = self._game.batch
-        self.lower = self.batch.lower
+        self.batch, self.lower = self._game.batch, self._game.batch.lower
         self.period = self.lower.period
         """Control period [s]."""
         self.steps: int

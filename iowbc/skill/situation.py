@@ -27,7 +27,7 @@ class Origin:
 
 @dataclass(frozen=True)
 class GameState:
-    """n games at one time; positions and vectors in the start frame."""
+    """n games at one time; positions and velocities (n, 3) in the start frame, the others (n,); SI units."""
 
     path: Indices
     """Numbers of the paths, (n,)."""

@@ -5,17 +5,15 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor, nn
 
+from iowbc.arrays import Array
 from iowbc.learning import checkpoint
 from iowbc.learning.checkpoint import Arrays, prefixed, under
 from iowbc.learning.networks import TeacherNetwork
 from iowbc.learning.normalization import Normalization
 from iowbc.learning.policy import HIDDEN_GAIN
 from iowbc.recipe.skill.skill import SkillLearning
-
-Values = NDArray[np.float32]
 
 
 class Trained:
@@ -39,7 +37,7 @@ class Trained:
         self.parameters = [*self.network.body.parameters(), self.log_std]
         self.optimizer = torch.optim.Adam(self.parameters, lr=self.rate, eps=1e-5)
 
-    def prepared(self, inputs: NDArray[np.float32]) -> Tensor:
+    def prepared(self, inputs: Array) -> Tensor:
         """Inputs (..., k), normalised."""
         with torch.inference_mode():
             return self.network.normalizer(torch.from_numpy(inputs))
@@ -64,7 +62,7 @@ class Trained:
             "rate": np.array([self.rate]),
         }
 
-    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+    def restore(self, arrays: Mapping[str, Array]) -> None:
         checkpoint.restore_module(self.network, under("network", arrays))
         with torch.no_grad():
             self.log_std.copy_(self.network.log_std)
@@ -74,8 +72,8 @@ class Trained:
 
 
 def mean_actions(
-    networks: Mapping[str, TeacherNetwork | None], observations: Mapping[str, Values], sizes: Mapping[str, int]
-) -> dict[str, Values]:
+    networks: Mapping[str, TeacherNetwork | None], observations: Mapping[str, Array], sizes: Mapping[str, int]
+) -> dict[str, Array]:
     """Mean action of each agent's policy, (n, size), within its bounds; zero, the nominal action, without a policy."""
     with torch.inference_mode():
         return {

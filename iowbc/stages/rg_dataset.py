@@ -85,7 +85,7 @@ def run(job: Job) -> None:
         "margin_p1": float(np.percentile(dataset.margin, 1)),
         "torque_ratio_p99": float(np.percentile(abs(dataset.torque / robot.effort[robot.support]).max(axis=1), 99)),
     }
-    if (symmetric := mirror_error(robot, plan, dataset)) is not None:
+    if (symmetric := mirror_error(plan, dataset)) is not None:
         metrics |= {"mirror_pairs": float(len(symmetric)), "mirror_p99": float(np.percentile(symmetric, 99))}
     if check is not None:
         metrics |= check.metrics
@@ -99,7 +99,7 @@ def run(job: Job) -> None:
     figures.mkdir(exist_ok=True)
     dataset_figures(figures, plan, dataset, region, rejected, check)
     try:
-        draw_strip(figures / "postures.png", robot, recipe, plan)
+        draw_strip(figures / "postures.png", plan)
     except NoRenderer as error:
         job.report.say(f"no picture of postures: {error}")
     if chosen and check is None:

@@ -105,7 +105,9 @@ def test_a_chain_ends_at_a_hinge(random: np.random.Generator) -> None:
         Chain([[stiff]])
 
 
-def test_the_example_of_the_docstring(random: np.random.Generator) -> None:
+def test_a_forearm_that_hangs_from_an_elbow_is_where_it_is_by_hand(random: np.random.Generator) -> None:
+    """With both hinges at a quarter turn, the end of a forearm of 0.3 m that turns about y lies below the elbow, which
+    an upper arm of 0.2 m that turns about z puts to the left of the shoulder."""
     upper, lower = body([0, 0, 1], random), body([0, 1, 0], random)
     upper.quaternion = lower.quaternion = np.array([1.0, 0.0, 0.0, 0.0])
     upper.position, lower.position = np.zeros(3), np.array([0.2, 0.0, 0.0])

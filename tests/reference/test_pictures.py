@@ -37,7 +37,7 @@ def test_the_comparison_with_optimal_control_shows_every_sample_and_its_limit() 
 
 def test_a_histogram_of_errors_says_how_many_lie_beyond_its_axis() -> None:
     axes = Figure().add_subplot()
-    figures.histogram(axes, np.r_[np.linspace(0.0, 1.0, 999), 50.0], "error [rad]", (0.5, "gate"))
+    figures.histogram(axes, np.r_[np.linspace(0.0, 1.0, 999), 50.0], "error [rad]", 0.5, "gate")
     (beyond,) = [text.get_text() for text in axes.texts]
     assert beyond.endswith(" beyond, up to 50")
     assert sum(bar.get_height() for bar in axes.patches) + int(beyond.split()[0]) == 1000  # type: ignore[attr-defined]

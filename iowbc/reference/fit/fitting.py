@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -18,16 +19,12 @@ FINAL_RATE = 0.01
 """Final learning rate as a fraction of the initial one."""
 
 
-@dataclass(frozen=True)
-class FitData:
+class FitData(NamedTuple):
     """Inputs (n, inputs), outputs (n, 15) [rad], and the task Jacobians (n, 10, 15) of some samples."""
 
     inputs: Array
     outputs: Array
     jacobian: Array
-
-    def take(self, which: Array) -> "FitData":
-        return FitData(self.inputs[which], self.outputs[which], self.jacobian[which])
 
 
 @dataclass(frozen=True)

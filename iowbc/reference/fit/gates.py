@@ -28,12 +28,9 @@ def measure_jumps(
         height = generator.uniform(low, high)
         steps = abs(np.diff(height)[0]) / smooth.height_step + abs(np.diff(pitch)[0]) / smooth.pitch_step
         along = np.append(np.arange(0.0, steps) / max(steps, 1e-9), 1.0)
-        command = np.empty((len(along), 2))
-        command[:, 0] = height[0] + along * (height[1] - height[0])
-        command[:, 1] = pitch[0] + along * (pitch[1] - pitch[0])
+        command = np.stack([start + along * (end - start) for start, end in (height, pitch)], axis=1)
         inside = feasible.contains(command[:, 0], command[:, 1])
-        arms = np.repeat(arm[line % len(arm)][None], len(along), axis=0)
-        reference = network(arms, command)
+        reference = network(np.tile(arm[line % len(arm)], (len(along), 1)), command)
         moved = np.abs(np.diff(reference, axis=0)).max(axis=1) * (inside[1:] & inside[:-1])
         largest[line] = moved.max()
     return largest

@@ -38,9 +38,8 @@ def prepare(
     """Splits by group and adds mirror images to the training part. Raises `Interrupted`."""
     kinematics = TaskKinematics(SupportModel(robot, recipe.problem), recipe.height)
     samples = [Sample(*row) for row in zip(dataset.arm, dataset.command, strict=True)]
-    configuration = np.concatenate(
-        [dataset.base_position, np.roll(dataset.base_quaternion, -1, axis=1), dataset.support], axis=1
-    )
+    orientation = np.roll(dataset.base_quaternion, -1, axis=1)
+    configuration = np.concatenate([dataset.base_position, orientation, dataset.support], axis=1)
     jacobian = np.empty((len(dataset), 10, len(robot.support)), dtype=np.float32)
     for row, (sample, q) in enumerate(zip(samples, configuration, strict=True)):
         jacobian[row] = kinematics.jacobian(sample, q)
@@ -48,16 +47,13 @@ def prepare(
             raise Interrupted
     train, validation, held_out = split_by_group(dataset.group, recipe.fit.validation, recipe.fit.held_out, seed)
     whole = FitData(np.concatenate([dataset.arm, dataset.command], axis=1), dataset.support, jacobian)
-    learnt = whole.take(train)
+    learnt, checked = (FitData(*(values[rows] for values in whole)) for rows in (train, validation))
     if recipe.fit.mirror:
         arms, legs = interaction_mirror(robot), support_mirror(robot)
-        image = FitData(
-            np.concatenate([arms(dataset.arm[train]), dataset.command[train]], axis=1),
-            legs(dataset.support[train]),
-            legs(jacobian[train]),
-        )
-        learnt = FitData(*map(np.concatenate, zip(vars(learnt).values(), vars(image).values(), strict=True)))
-    return Prepared(learnt, whole.take(validation), train, held_out, samples, kinematics)
+        inputs = np.concatenate([arms(dataset.arm[train]), dataset.command[train]], axis=1)
+        image = FitData(inputs, legs(dataset.support[train]), legs(jacobian[train]))
+        learnt = FitData(*map(np.concatenate, zip(learnt, image, strict=True)))
+    return Prepared(learnt, checked, train, held_out, samples, kinematics)
 
 
 def split_by_group(group: Array, validation: float, held_out: float, seed: int) -> tuple[Indices, Indices, Indices]:

@@ -1,7 +1,7 @@
 """Errors of feet, height and torso of a support posture by forward kinematics, and their Jacobian."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import pinocchio
@@ -18,7 +18,7 @@ LENGTH_ROWS = (0, 1, 2, 6)
 
 @dataclass(frozen=True)
 class TaskErrors:
-    """Errors of postures that stand on both soles, the soles fitted together to their places."""
+    """Errors of postures that stand on both soles, the soles fitted together to their places, (n,) [m, rad]."""
 
     height: Array
     """Height reached minus commanded, shape (n,) [m]."""
@@ -44,32 +44,26 @@ class TaskKinematics:
         found = np.array([self._error(sample, posture) for sample, posture in zip(samples, postures, strict=True)])
         return TaskErrors(*found.T)
 
-    def _error(self, sample: Sample, posture: Array) -> tuple[float, float, float, float, float]:
+    def _error(self, sample: Sample, posture: Array) -> tuple[Any, ...]:
+        """One row of `TaskErrors`."""
         support = self.support
         model, data = support.model, support.data
         support.lock(sample)
         q = pinocchio.neutral(model)
         q[7:] = posture
-        com = pinocchio.centerOfMass(model, data, q).copy()
+        centre = pinocchio.centerOfMass(model, data, q).copy()
         pinocchio.updateFramePlacements(model, data)
         soles = [data.oMf[sole] for sole in support.soles]
         turn = soles[0].rotation.T @ soles[1].rotation
-        middle = pinocchio.SE3(
-            soles[0].rotation @ pinocchio.exp3(0.5 * pinocchio.log3(turn)),
-            0.5 * (soles[0].translation + soles[1].translation),
-        )
-        base, torso = middle.actInv(data.oMf[support.base]), middle.actInv(data.oMf[support.torso])
-        com = middle.actInv(com)
+        rotation = soles[0].rotation @ pinocchio.exp3(0.5 * pinocchio.log3(turn))
+        middle = pinocchio.SE3(rotation, 0.5 * (soles[0].translation + soles[1].translation))
+        com, base, torso = map(middle.actInv, (centre, data.oMf[support.base], data.oMf[support.torso]))
         left = middle.actInv(soles[0]).translation - support.stance[0].translation
         reached = com[2] if self.height == "com" else base.translation[2]
         turned = sample.torso_rotation().T @ torso.rotation
-        return (
-            float(reached - sample.height),
-            float(pinocchio.log3(turned)[1]),
-            float(np.linalg.norm(left)),
-            float(0.5 * np.linalg.norm(pinocchio.log3(turn))),
-            float(support_margin(self.edges, com[:2])),
-        )
+        foot, foot_rotation = np.linalg.norm(left), 0.5 * np.linalg.norm(pinocchio.log3(turn))
+        margin = support_margin(self.edges, com[:2])
+        return reached - sample.height, pinocchio.log3(turned)[1], foot, foot_rotation, margin
 
     def jacobian(self, sample: Sample, configuration: Array) -> Array:
         """Derivative of foot position and rotation, height and torso rotation by the support joints, shape (10, 15).

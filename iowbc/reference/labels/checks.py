@@ -9,7 +9,6 @@ from iowbc.recipe.generator import ReferenceGenerator
 from iowbc.reference.labels.dataset import Dataset
 from iowbc.reference.labels.plan import SamplePlan
 from iowbc.reference.labels.shards import Shard
-from iowbc.robot.description import Robot
 from iowbc.robot.mirror import support_mirror
 
 WORST = 5
@@ -54,15 +53,12 @@ def compare_methods(dataset: Dataset, again: Shard) -> MethodComparison | None:
     return MethodComparison(difference, metrics, worst)
 
 
-def mirror_error(robot: Robot, plan: SamplePlan, dataset: Dataset) -> Array | None:
-    """Largest joint difference of each mirrored sample from its original's mirror image, shape (pairs,) [rad].
-
-    None without pairs.
-    """
+def mirror_error(plan: SamplePlan, dataset: Dataset) -> Array | None:
+    """Largest joint difference of mirrored samples from mirror images of their originals, (pairs,) [rad], if any."""
     row = {int(index): place for place, index in enumerate(dataset.index)}
     images = [index for index in row if plan.original <= index < plan.drawn and plan.group(index) in row]
     if not images:
         return None
     own = dataset.support[[row[index] for index in images]]
     source = dataset.support[[row[plan.group(index)] for index in images]]
-    return np.abs(support_mirror(robot)(source) - own).max(axis=1)
+    return np.abs(support_mirror(plan.robot)(source) - own).max(axis=1)

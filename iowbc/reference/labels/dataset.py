@@ -47,7 +47,7 @@ class Dataset:
         return len(self.index)
 
     def save(self, path: Path) -> None:
-        np.savez_compressed(path, allow_pickle=False, **{f.name: getattr(self, f.name) for f in fields(self)})
+        np.savez_compressed(path, allow_pickle=False, **vars(self))
 
     @classmethod
     def load(cls, path: Path) -> "Dataset":
@@ -57,12 +57,10 @@ class Dataset:
             if missing:
                 raise ValueError(f"{path}: no arrays {', '.join(missing)}; make it anew with `--force rg-dataset`")
             dataset = cls(**{f.name: stored[f.name] for f in fields(cls)})
-        for f in fields(cls):
-            values = getattr(dataset, f.name)
+        for name, values in vars(dataset).items():
             if values.dtype.kind == "f" and not np.isfinite(values).all():
-                raise ValueError(
-                    f"{path}: {f.name} has values that are not finite; make it anew with `--force rg-dataset`"
-                )
+                text = f"{path}: {name} has values that are not finite"
+                raise ValueError(f"{text}; make it anew with `--force rg-dataset`")
         return dataset
 
 

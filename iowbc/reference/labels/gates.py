@@ -35,7 +35,7 @@ class LabelChecker:
         support = self.support
         q = support.whole(support.start(), sample.arm)
         pinocchio.forwardKinematics(support.full, support.full_data, q)
-        if self.collision.clearance(support.full_data)[0] < self.gates.collision_clearance:
+        if self.collision.clearance(support.full_data) < self.gates.collision_clearance:
             raise Rejected("arms collide")
 
     def label(self, sample: Sample, posture: Posture) -> dict[str, Array]:
@@ -53,10 +53,8 @@ class LabelChecker:
         height = float(com[2] if self.height == "com" else data.oMf[self.base].translation[2])
         turned = pinocchio.log3(sample.torso_rotation().T @ data.oMf[self.torso].rotation)
         margin = float(support_margin(self.edges, com[:2]))
-        moved, tilted = (
-            max(map(np.linalg.norm, sizes))
-            for sizes in ([one.translation for one in errors], [pinocchio.log3(one.rotation) for one in errors])
-        )
+        moved = max(np.linalg.norm(one.translation) for one in errors)
+        tilted = max(np.linalg.norm(pinocchio.log3(one.rotation)) for one in errors)
         failed = {
             "feet": moved > gates.foot_position or tilted > gates.foot_rotation,
             "height": abs(height - sample.height) > gates.height,
@@ -66,7 +64,7 @@ class LabelChecker:
             "friction or centre of pressure": (posture.wrench @ self.cone.T > self.bound + gates.wrench).any(),
             "joint limits": (q[7:] < robot.lower).any() or (q[7:] > robot.upper).any(),
             "support margin": margin < gates.support_margin,
-            "self-collision": self.collision.clearance(data)[0] < gates.collision_clearance,
+            "self-collision": self.collision.clearance(data) < gates.collision_clearance,
         }
         for reason, found in failed.items():
             if found:
@@ -75,8 +73,7 @@ class LabelChecker:
 
 
 class SelfCollision:
-    """Distances between capsules, except on bodies that are fixed to each other, one joint apart, or excluded by the
-    MJCF."""
+    """Distances between capsules, except on bodies fixed to each other, one joint apart, or excluded by the MJCF."""
 
     def __init__(self, robot: Robot, model: Any) -> None:
         self._model, self._geometry = model, pinocchio.GeometryModel()
@@ -88,21 +85,17 @@ class SelfCollision:
                 pinocchio.GeometryObject(capsule.name, frame.parentJoint, frame.placement * placement, shape)
             )
         self.names = tuple(capsule.name for _, capsule in shapes)
-        self.pairs = [
-            (a, b)
-            for a, b in combinations(range(len(shapes)), 2)
-            if _may_touch(robot, shapes[a][0].name, shapes[b][0].name)
-        ]
+        owner = [body.name for body, _ in shapes]
+        self.pairs = [(a, b) for a, b in combinations(range(len(shapes)), 2) if _may_touch(robot, owner[a], owner[b])]
         for a, b in self.pairs:
             self._geometry.addCollisionPair(pinocchio.CollisionPair(a, b))
         self._found = self._geometry.createData()
 
-    def clearance(self, data: Any) -> tuple[float, str]:
-        """Least distance [m] (negative: overlap) and the pair's names, after forward kinematics in `data`."""
+    def clearance(self, data: Any) -> float:
+        """Least distance [m] (negative: overlap), after forward kinematics in `data`."""
         pinocchio.updateGeometryPlacements(self._model, data, self._geometry, self._found)
         nearest = pinocchio.computeDistances(self._geometry, self._found)
-        a, b = self.pairs[nearest]
-        return float(self._found.distanceResults[nearest].min_distance), f"{self.names[a]} and {self.names[b]}"
+        return float(self._found.distanceResults[nearest].min_distance)
 
 
 def _placed(capsule: Capsule) -> tuple[Any, Any]:

@@ -50,9 +50,8 @@ class OptimalControlMethod:
 
     def trajectory(self, sample: Sample) -> list[Array]:
         """States (configuration, velocity) at the nodes. The support model must be locked to the sample."""
-        start = np.concatenate(
-            [kinematic_start(self.support, self.recipe.height, sample), np.zeros(self.support.model.nv)]
-        )
+        posture = kinematic_start(self.support, self.recipe.height, sample)
+        start = np.concatenate([posture, np.zeros(self.support.model.nv)])
         contacts = self._contacts()
         running = self._action(self._costs(sample, terminal=False), contacts, self.ocp.step)
         terminal = self._action(self._costs(sample, terminal=True), contacts, 0.0)
@@ -132,10 +131,8 @@ def distribute(support: SupportModel, configuration: Array, limits: SoleLimits) 
     gravity = pinocchio.computeGeneralizedGravity(model, data, configuration).copy()
     pinocchio.computeJointJacobians(model, data, configuration)
     pinocchio.updateFramePlacements(model, data)
-    transposed = np.concatenate(
-        [pinocchio.getFrameJacobian(model, data, sole, pinocchio.LOCAL).T for sole in support.soles], axis=1
-    )
-    base, joints = transposed[:6], transposed[6:]
+    jacobians = [pinocchio.getFrameJacobian(model, data, sole, pinocchio.LOCAL).T for sole in support.soles]
+    base, joints = np.split(np.concatenate(jacobians, axis=1), [6])
     cone, bound = limits.rows()
     rows, upper = np.kron(np.eye(2), cone), np.tile(bound, 2)
     lower = np.full(len(upper), -UNBOUNDED)

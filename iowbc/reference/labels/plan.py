@@ -38,10 +38,8 @@ class SamplePlan:
         default = float(np.clip(robot.default_height, self.heights[0], self.heights[-1]))
         self.nominal = default, float(np.clip(0.0, self.pitches[0], self.pitches[-1]))
         self.count = self.drawn + int(np.prod(self.grid_shape))
-        dimensions = 2 + 2 + 6 + len(arms)
-        self.unit: Array = qmc.Sobol(dimensions, rng=np.random.default_rng(seed)).random_base2(
-            int(np.ceil(np.log2(max(self.original, 2))))
-        )
+        dimensions, power = 2 + 2 + 6 + len(arms), int(np.ceil(np.log2(max(self.original, 2))))
+        self.unit: Array = qmc.Sobol(dimensions, rng=np.random.default_rng(seed)).random_base2(power)
 
     def group(self, index: int) -> int:
         """Samples of one group are mirror images of each other and stay on one side of the held-out split."""
@@ -80,10 +78,9 @@ class SamplePlan:
         chooser = unit[:, 2]
         if sampling.boundary_share > 0.0:
             edge = np.floor(4.0 * chooser / sampling.boundary_share).astype(int)
-            for number, (column, value) in enumerate(
-                ((0, sampling.height.low), (0, sampling.height.high), (1, sampling.pitch.low), (1, sampling.pitch.high))
-            ):
-                command[edge == number, column] = value
+            edges = (sampling.height.low, sampling.height.high, sampling.pitch.low, sampling.pitch.high)
+            for number, value in enumerate(edges):
+                command[edge == number, number // 2] = value
         return command
 
     def _arms(self, unit: Array, command: Array) -> Array:
@@ -96,9 +93,7 @@ class SamplePlan:
         heading = ~nominal & (kind < sampling.heading_share)
         by_wrist = ~nominal & (kind < sampling.heading_share + sampling.torso_share)
         arm[nominal] = self.rest
-        corner = np.stack(
-            [_scale(place[:, i], interval) for i, interval in enumerate((region.x, region.y, region.z))], axis=1
-        )
+        corner = np.stack([_scale(place[:, i], each) for i, each in enumerate((region.x, region.y, region.z))], axis=1)
         shift = region.asymmetry * (2.0 * place[:, 3:] - 1.0)
         target = np.stack([corner + shift, corner - shift], axis=1) * np.array([[1.0, 1.0, 1.0], [1.0, -1.0, 1.0]])
         waist = np.zeros((len(unit), 3))

@@ -24,8 +24,7 @@ class Sample:
 
     def torso_rotation(self) -> Array:
         """Commanded torso orientation relative to the feet: a pitch about the lateral axis, shape (3, 3)."""
-        level = np.zeros(())
-        return rotations.matrix(rotations.from_euler(level, self.command[1], level))
+        return rotations.matrix(rotations.from_euler(np.zeros(()), self.command[1], np.zeros(())))
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,7 @@
 """Limits of two soles on the ground: wrenches and support polygon."""
 
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from scipy.spatial import ConvexHull
@@ -33,9 +34,7 @@ class SoleLimits:
         pressure = [[0, 0, -y, 1, 0, 0], [0, 0, -y, -1, 0, 0], [0, 0, -x, 0, 1, 0], [0, 0, -x, 0, -1, 0]]
         torsion = [
             [a * y, b * x, -mu * (x + y), -turn * a * mu, -turn * b * mu, -turn]
-            for turn in (1.0, -1.0)
-            for a in (1.0, -1.0)
-            for b in (1.0, -1.0)
+            for turn, a, b in product((1.0, -1.0), repeat=3)
         ]
         load = [[0, 0, -1, 0, 0, 0]]
         rows = np.array([*pyramid, *pressure, *torsion, *load], dtype=np.float64)

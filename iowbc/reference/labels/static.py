@@ -74,16 +74,9 @@ class StaticMethod:
         gradient[:6, :nv], gradient[6 + self.joints :, :nv] = cost.gradient[:6], cost.gradient[6:]
         gradient[6 : 6 + self.joints] = torque_rows
         residual = np.concatenate([cost.residual[:6], torque, cost.residual[6:]])
-        lower = np.concatenate(
-            [np.maximum(support.lower - q[7:], -largest), -support.effort - torque, np.full(len(self.cone), -UNBOUNDED)]
-        )
-        upper = np.concatenate(
-            [
-                np.minimum(support.upper - q[7:], largest),
-                support.effort - torque,
-                self.cone_bound - self.cone @ wrench.ravel(),
-            ]
-        )
+        least, most = np.maximum(support.lower - q[7:], -largest), np.minimum(support.upper - q[7:], largest)
+        lower = np.concatenate([least, -support.effort - torque, np.full(len(self.cone), -UNBOUNDED)])
+        upper = np.concatenate([most, support.effort - torque, self.cone_bound - self.cone @ wrench.ravel()])
         rows = np.concatenate([self.angle_rows, torque_rows, self.cone_rows])
         gradient, residual = self.root_weight[:, None] * gradient, self.root_weight * residual
         return constrained_step(gradient, residual, equality, error, rows, lower, upper)

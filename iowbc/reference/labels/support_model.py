@@ -61,8 +61,7 @@ class SupportModel:
         self.base = self.model.getFrameId(robot.base)
         self._torso_joint = int(self.model.frames[self.torso].parentJoint)
         self._full_torso = self.full.getJointId(self.model.names[self._torso_joint])
-        places = mean_stance(problem.stance_width)
-        self.stance = [pinocchio.SE3(np.eye(3), place) for place in places]
+        self.stance = [pinocchio.SE3(np.eye(3), place) for place in mean_stance(problem.stance_width)]
         margin = problem.limit_margin
         self.lower, self.upper = robot.lower[robot.support] + margin, robot.upper[robot.support] - margin
         self.effort = problem.effort_fraction * robot.effort[robot.support]
@@ -96,8 +95,7 @@ class SupportModel:
         return q
 
     def rest(self, sample: Sample) -> Array:
-        """Reference of the posture cost, shape (22,): default posture, with part of the commanded pitch in the
-        waist."""
+        """Reference of the posture cost, (22,): default posture, with part of the commanded pitch in the waist."""
         q = self.start()
         waist = self.robot.waist_pitch
         lean = q[7 + waist] + self.problem.waist_share * sample.command[1] / max(len(waist), 1)
@@ -107,9 +105,7 @@ class SupportModel:
 
 def ground_forces(model: Any, soles: list[int], wrench: Array) -> Any:
     """Ground wrenches (2, 6) on a model's soles as pinocchio's list of forces in the joints' frames."""
-    forces = pinocchio.StdVec_Force()
-    for _ in range(model.njoints):
-        forces.append(pinocchio.Force.Zero())
+    forces = pinocchio.StdVec_Force([pinocchio.Force.Zero()] * model.njoints)
     for sole, values in zip(soles, wrench, strict=True):
         frame = model.frames[sole]
         forces[frame.parentJoint] = frame.placement.act(pinocchio.Force(values))

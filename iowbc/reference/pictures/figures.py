@@ -25,9 +25,6 @@ BINS, FEWEST_BINS = 60, 20
 SHOWN = 99.8
 """Percentile at which the axis of an error ends, so that single outliers do not stretch it."""
 
-Limit = tuple[float, str]
-"""Limit and its label."""
-
 
 def dataset_figures(
     folder: Path,
@@ -49,8 +46,8 @@ def dataset_figures(
     figure, (left, middle, right) = _figure(1, 3, 11.0, 3.4)
     torque = np.abs(dataset.torque / plan.robot.effort[plan.robot.support]).max(axis=1)
     histogram(left, torque, "largest torque [share of its limit]", everything=True)
-    least = _limit(plan.recipe.gates.support_margin, "least that is kept", 1e2)
-    histogram(middle, 1e2 * dataset.margin, "support margin [cm]", least, everything=True)
+    least, meaning = plan.recipe.gates.support_margin, "least that is kept"
+    histogram(middle, dataset.margin, "support margin [cm]", least, meaning, factor=1e2, everything=True)
     histogram(right, 1e3 * (dataset.reached - dataset.command[:, 0]), "height error [mm]", everything=True)
     figure.suptitle(f"Effort, margin and height of the labels, {len(dataset)} samples")
     write_figure(figure, folder / "labels.png")
@@ -61,8 +58,8 @@ def dataset_figures(
 def crosscheck_figure(check: MethodComparison, limit: float) -> Figure:
     """Differences between static labels and optimal control, with the limit of their 90th percentile [rad]."""
     figure, (axes,) = _figure(1, 1, 5.0, 3.4)
-    said = (limit, "limit of the 90th percentile")
-    histogram(axes, check.difference, "largest joint difference [rad]", said, everything=True)
+    meaning = "limit of the 90th percentile"
+    histogram(axes, check.difference, "largest joint difference [rad]", limit, meaning, everything=True)
     axes.set_title(f"static labels against optimal control, {len(check.difference)} samples")
     return figure
 
@@ -80,14 +77,13 @@ def error_figures(
     figure, axes = _figure(2, 3, 11.0, 6.0)
     squared = (predicted - labels) ** 2
     most, p95, p1 = "gate of the RMSE of all", "gate of the 95th percentile", "gate of the 1st percentile"
-    rmse = np.sqrt(squared.mean(axis=1))
-    histogram(axes[0], rmse, "joint RMSE of a sample [rad]", _limit(gates.joint_rmse, most))
-    histogram(axes[1], 1e3 * np.abs(errors.height), "height error [mm]", _limit(gates.height_p95, p95, 1e3))
-    histogram(axes[2], np.abs(errors.pitch), "torso pitch error [rad]", _limit(gates.pitch_p95, p95))
-    histogram(axes[3], 1e3 * errors.foot, "foot mismatch [mm]", _limit(gates.foot_p95, p95, 1e3))
-    margin, jump = _limit(gates.margin_p1, p1, 1e2), _limit(gates.jump, "gate of the largest")
-    histogram(axes[4], 1e2 * errors.margin, "support margin [cm]", margin, everything=True)
-    histogram(axes[5], jumps, "largest jump on a line [rad]", jump, counted="lines", everything=True)
+    largest, rmse = "gate of the largest", np.sqrt(squared.mean(axis=1))
+    histogram(axes[0], rmse, "joint RMSE of a sample [rad]", gates.joint_rmse, most)
+    histogram(axes[1], np.abs(errors.height), "height error [mm]", gates.height_p95, p95, factor=1e3)
+    histogram(axes[2], np.abs(errors.pitch), "torso pitch error [rad]", gates.pitch_p95, p95)
+    histogram(axes[3], errors.foot, "foot mismatch [mm]", gates.foot_p95, p95, factor=1e3)
+    histogram(axes[4], errors.margin, "support margin [cm]", gates.margin_p1, p1, factor=1e2, everything=True)
+    histogram(axes[5], jumps, "largest jump on a line [rad]", gates.jump, largest, counted="lines", everything=True)
     figure.suptitle(f"Held-out errors of the reference generator, {len(labels)} samples")
     write_figure(figure, folder / "errors.png")
 
@@ -159,24 +155,25 @@ def _ranked(axes: Any, names: Sequence[str], values: Any, label: str, **style: A
     return bars
 
 
-def _limit(value: float | None, meaning: str, factor: float = 1.0) -> Limit | None:
-    return None if value is None else (factor * value, meaning)
-
-
 def histogram(
     axes: Any,
     values: Array,
     label: str,
-    limit: Limit | None = None,
+    limit: float | None = None,
+    meaning: str = "",
     *,
+    factor: float = 1.0,
     counted: str = "samples",
     everything: bool = False,
 ) -> None:
-    """Histogram with the limit as a dashed line; without `everything` it gives the number of values beyond the axis."""
+    """Histogram of values times `factor`, with a limit and its meaning as a dashed line; without `everything` it gives
+    the number of values beyond the axis."""
+    values = factor * values
     low, high = float(values.min()), float(values.max() if everything else np.percentile(values, SHOWN))
     if limit is not None:
-        low, high = min(low, limit[0]), max(high, limit[0])
-        axes.axvline(limit[0], color=WARM, linestyle="--", label=limit[1])
+        limit *= factor
+        low, high = min(low, limit), max(high, limit)
+        axes.axvline(limit, color=WARM, linestyle="--", label=meaning)
         axes.legend(fontsize="small")
     bins = min(BINS, max(FEWEST_BINS, len(values) // 4))
     drawn, _, _ = axes.hist(values, np.linspace(low, high + 1e-9, bins), color=SOFT, edgecolor=INK, linewidth=0.3)

@@ -9,7 +9,6 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from iowbc.errors import Rejected
-from iowbc.recipe.generator import ReferenceGenerator
 from iowbc.reference.labels.gates import LabelChecker
 from iowbc.reference.labels.plan import SamplePlan
 from iowbc.reference.labels.sample import Posture, Sample
@@ -29,11 +28,10 @@ EMPTY = 235
 """Grey of a command without a label."""
 
 
-def draw_strip(path: Path, robot: Robot, recipe: ReferenceGenerator, plan: SamplePlan) -> None:
-    """Labels a small grid by the static method and draws it. Raises NoRenderer without a renderer.
-
-    The arms are in the default posture, or keep the wrists ahead of the pelvis if that has no label.
-    """
+def draw_strip(path: Path, plan: SamplePlan) -> None:
+    """Labels a small grid by the static method and draws it, with the arms in the default posture, or with the wrists
+    kept ahead of the pelvis if that has no label. Raises NoRenderer."""
+    robot, recipe = plan.robot, plan.recipe
     heights = np.interp((np.arange(HEIGHTS)[::-1] + 0.5) / HEIGHTS, [0.0, 1.0], plan.heights[[0, -1]])
     places = np.linspace(0, len(plan.pitches) - 1, PITCHES).round().astype(int)
     support, model = SupportModel(robot, recipe.problem), _scene(robot)

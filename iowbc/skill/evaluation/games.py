@@ -69,9 +69,8 @@ def play_batches(
 ) -> Iterator[pd.DataFrame]:
     """Rows of a competitor's episodes, batch by batch; finished batches are kept in `work`.
 
-    `human`: the learnt one, the same for every competitor; `controller`: the world and student below the competitor;
-    `workers`: see `TransportGame`. Raises Interrupted when interrupted, StageFailed if the competitor observes another
-    number of values than the games show.
+    `human`: the learnt one; `controller`: the world and student below the competitor; `workers`: see `TransportGame`.
+    Raises Interrupted, and StageFailed if the competitor observes another number of values than the games show.
     """
     for begin in range(0, len(planned), settings.games):
         batch = planned[begin : begin + settings.games]

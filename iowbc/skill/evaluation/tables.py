@@ -1,13 +1,12 @@
 """Tables and figure of the skill layer's games: forces and the worst partner first, then success."""
 
-from collections.abc import Mapping
 from functools import cache
 
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from iowbc.arrays import Array, Indices
 from iowbc.evaluation.report.figures import draw_bars, finish
 from iowbc.evaluation.report.statistics import RESAMPLES, Bootstrapped, bootstrapped, interquartile_mean
 from iowbc.results.table import ABSENT, Cell, Table, heads
@@ -27,8 +26,6 @@ COLUMNS = {
 }
 """Metrics of an episode with column heading and number format, in table order."""
 SEEDS_OF_THE_BOOTSTRAP = 0
-
-Values = NDArray[np.float64]
 
 
 def tables(games: pd.DataFrame, held_out: tuple[str, ...]) -> list[Table]:
@@ -94,18 +91,15 @@ def estimate(games: pd.DataFrame, figure: str, whole: bool = False) -> Bootstrap
     values = by_training(games, figure)
     drawn = values[_resamples(*values.shape)].reshape(RESAMPLES, -1)
 
-    def mean(rows: Values) -> Values:
+    def mean(rows: Array) -> Array:
         return np.asarray(rows.mean(axis=-1)) if whole else interquartile_mean(rows)
 
     return bootstrapped(mean(values.ravel()), mean(drawn))
 
 
-def by_training(games: pd.DataFrame, figure: str) -> Values:
+def by_training(games: pd.DataFrame, figure: str) -> Array:
     """A metric by training and episode, (trainings, episodes)."""
-    wide = games.assign(**{figure: games[figure].astype(np.float64)}).pivot(
-        index="training", columns=UNIT, values=figure
-    )
-    return wide.to_numpy(np.float64)
+    return games.pivot(index="training", columns=UNIT, values=figure).to_numpy(np.float64)
 
 
 def worst_partner(games: pd.DataFrame) -> Bootstrapped:
@@ -124,7 +118,7 @@ def improvement(first: pd.DataFrame, other: pd.DataFrame) -> Bootstrapped:
 
 
 @cache
-def _resamples(trainings: int, units: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _resamples(trainings: int, units: int) -> tuple[Indices, Indices]:
     """Trainings (RESAMPLES, trainings, 1) and episodes (RESAMPLES, 1, units) of each resample, with replacement."""
     generator = np.random.default_rng(SEEDS_OF_THE_BOOTSTRAP)
     drawn = [[generator.integers(n, size=n) for n in (trainings, units)] for _ in range(RESAMPLES)]
@@ -142,26 +136,21 @@ def headline(games: pd.DataFrame) -> dict[str, float]:
     found: dict[str, float] = {}
     for (label, known), own in games.groupby(["label", "known"], sort=False):
         name = f"{label}/{'known' if known else 'human_only'}".replace(" ", "_")
-        values: Mapping[str, float] = {
-            "partner_force_p90": float(interquartile_mean(own[FORCE].to_numpy(np.float64))),
-            "worst_partner": worst_partner(own).value,
-            "success": float(own[SUCCESS].mean()),
-        }
-        found |= {f"{name}/{figure}": value for figure, value in values.items()}
+        found[f"{name}/partner_force_p90"] = float(interquartile_mean(own[FORCE].to_numpy(np.float64)))
+        found[f"{name}/worst_partner"] = worst_partner(own).value
+        found[f"{name}/success"] = float(own[SUCCESS].mean())
     return found
 
 
 def figure(games: pd.DataFrame) -> Figure:
     """Force and success by partner and by whether the robot knows the path."""
-    labels = list(dict.fromkeys(games["label"]))
+    labels, titles = list(dict.fromkeys(games["label"])), {FORCE: "partner force p90 [N]", SUCCESS: "success [share]"}
     kinds = [known for known in (True, False) if known in set(games["known"])]
     drawing = Figure(figsize=(11.0, 3.2 * len(kinds)), layout="constrained")
     grid = drawing.subplots(len(kinds), 2, squeeze=False)
     for axes, known in zip(grid, kinds, strict=True):
         partners = list(dict.fromkeys(games[games["known"] == known]["partner"]))
-        for panel, (name, title) in zip(
-            axes, ((FORCE, "partner force p90 [N]"), (SUCCESS, "success [share]")), strict=True
-        ):
+        for panel, (name, title) in zip(axes, titles.items(), strict=True):
             heights, intervals = {}, {}
             for label in labels:
                 own = games[(games["label"] == label) & (games["known"] == known)]
