@@ -89,9 +89,8 @@ def known_names(store: Store) -> dict[str, tuple[str, ...]]:
 
 def last_used(store: Store, recipe: str) -> dict[str, Artifact]:
     """By stage: the artifacts that a recipe used last, as far as they are still stored."""
-    used = recall(store.runs, recipe).stages
-    found = {stage: store.find_any(stage, use.key) for stage, use in used.items()}
-    return {stage: artifact for stage, artifact in found.items() if artifact is not None}
+    used = recall(store.runs, recipe).stages.items()
+    return {stage: found for stage, use in used if (found := store.find_any(stage, use.key)) is not None}
 
 
 def _recipe(store: Store, word: str, name: str, published: Mapping[str, Mapping[str, Artifact]]) -> Run:

@@ -61,8 +61,7 @@ def publish(
         left_out = ", ".join(copy.manifest.omitted)
         lacks = [f"without {left_out}"] if left_out else []
         what = f"{artifact.manifest.stage}: {shown_path(copy.folder)} ({decimal(copy.size)})"
-        text = "; ".join([what, *lacks, *notes.get(key, ())])
-        tell(console, text)
+        tell(console, "; ".join([what, *lacks, *notes.get(key, ())]))
     size = published_size(request.runs)
     console.print(f"{decimal(size)} are published in all", highlight=False)
     if size > LARGEST_REPOSITORY:
