@@ -63,13 +63,11 @@ def die_with_parent(parent: int, *, bound: bool = True, number: int = signal.SIG
 @contextmanager
 def single_threaded() -> Iterator[None]:
     """Processes that are started inside have one thread of linear algebra each."""
-    before = {name: os.environ.get(name) for name in SINGLE_THREADED}
+    before = {name: os.environ[name] for name in SINGLE_THREADED if name in os.environ}
     os.environ.update(SINGLE_THREADED)
     try:
         yield
     finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
+        for name in SINGLE_THREADED:
+            del os.environ[name]
+        os.environ.update(before)

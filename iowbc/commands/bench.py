@@ -25,7 +25,7 @@ def sim(
     workers: BenchWorkers = None,
     runs: options.RunsFolder = options.RUNS,
 ) -> None:
-    """Measure the vector environment. Raises `UsageError`, as the one below does."""
+    """Measure the vector environment. Raises `UsageError`."""
     own, counts = _checked(runs, recipe, scene), tuple(workers or ())
     from iowbc.benchmarks import simulation
 
@@ -43,7 +43,7 @@ def train(
     ] = None,
     runs: options.RunsFolder = options.RUNS,
 ) -> None:
-    """Measure the teacher's training."""
+    """Measure the teacher's training. Raises `UsageError`."""
     own = _checked(runs, recipe, scene)
     from iowbc.benchmarks import training
 
@@ -65,9 +65,7 @@ def control(
         print(f"{name:16}{median:>12}{late:>18}{longest:>12}")
 
 
-def engines(
-    robot: Annotated[str, typer.Argument(help="Robot, by name or folder.", metavar="ROBOT")] = "g1",
-) -> None:
+def engines(robot: Annotated[str, typer.Argument(help="Robot, by name or folder.", metavar="ROBOT")] = "g1") -> None:
     """Compare MuJoCo and Drake. Raises `UsageError`, and `IowbcError` where they differ."""
     options.require_extra("train", "iowbc bench")
     from iowbc.benchmarks import engines
@@ -78,8 +76,7 @@ def engines(
 
 
 def _checked(runs: Path, file: Path | None, scene: str) -> Recipe:
-    """The recipe in a file, or the default one, once everything that a benchmark needs is there. Raises `UsageError`,
-    also for a scene that it does not have."""
+    """The recipe in a file, or the default one. Raises `UsageError` where anything that it needs is missing."""
     recipe = load_recipe(file).recipe if file is not None else Recipe(name="bench")
     require_known(scene, "scene", recipe.simulation.scenes.names)
     options.require_extra("train", "iowbc bench")

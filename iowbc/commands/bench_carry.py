@@ -63,8 +63,7 @@ def carry(
     workers: options.Workers = None,
     out: Annotated[Path, typer.Option(help="Output page.", metavar="FILE")] = Path("carry.md"),
 ) -> None:
-    """Play the suites and write the page. Raises UsageError, RecipeError, and StageFailed where the controller cannot
-    be used."""
+    """Play the suites and write the page. Raises UsageError, and StageFailed where the controller cannot be used."""
     options.require_extra("train", "iowbc bench carry")
     from iowbc.adapters.source import SHIPPED, policy_digest, policy_path
 

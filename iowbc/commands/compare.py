@@ -51,12 +51,8 @@ def compare(
     as_json: options.AsJson = False,
     runs: options.RunsFolder = options.RUNS,
 ) -> None:
-    """Write `metrics.md`, learning curves, and the report over all trials, under `output`; print the tables.
-
-    words: runs, two or more, or a study, of which those are compared that have finished. output: empty for
-    a folder of `runs/compare/`. film: also play one trial that all share again, and show the runs side by side. Raises
-    `UsageError`.
-    """
+    """Write `metrics.md`, learning curves, and the report over all trials, under `output`; print the tables. Of a study
+    those recipes are compared that have finished. Raises `UsageError`."""
     store = Store(Runs(runs))
     found = _recipes(store, words, "compare")
     study = next((word for word in words if members_of(word)), "")
@@ -69,7 +65,7 @@ def compare(
 def write_comparison(
     store: Store, found: Sequence[Run], output: Path, study: str = "", *, film: bool = False, as_json: bool = False
 ) -> None:
-    """Compare runs under `output`, and print the tables; see `compare`. study: the study whose variants they are."""
+    """Compare runs under `output`, and print the tables; `study`: the study whose variants they are."""
     console, tried = stdout_console(), _having(found, TRIALS)
     require_writable(output, "--output")
     if film and len(tried) < 2:
@@ -155,8 +151,7 @@ def _recipes(store: Store, words: Sequence[str], command: str) -> list[Run]:
 
 
 def _joined(store: Store, found: Sequence[Run]) -> tuple[list[Table], dict[str, bytes]]:
-    """Result tables of one run; for several runs the tables over all their trials, and their joint figures and film by
-    file name."""
+    """Result tables of one run, or over all trials of several; also their joint figures and film by file name."""
     evaluated = [run.artifacts["eval"] for run in found if "eval" in run.artifacts]
     if len(evaluated) < 2:
         return [table for one in evaluated for table in read_tables(one.folder / "tables")], {}
@@ -244,10 +239,8 @@ def _report_probes(found: Sequence[Run], output: Path) -> None:
 
 
 def report_joint(runs: Sequence[Run], output: Path, missing: Sequence[str] = ()) -> None:
-    """Write tables and figures over all trials of the runs under `output`.
-
-    missing: recipes that belong to them and have not run. Raises `UsageError` where the runs count masses differently.
-    """
+    """Write tables and figures over all trials of the runs under `output`; `missing`: recipes that belong to them and
+    have not run. Raises `UsageError` where the runs count masses differently."""
     import pandas as pd
 
     from iowbc.evaluation.report.report import write_report
@@ -263,8 +256,7 @@ def report_joint(runs: Sequence[Run], output: Path, missing: Sequence[str] = ())
 
 
 def trainings_table(groups: Sequence[Group], missing: Sequence[str] = ()) -> Table:
-    """Length and seed of each training behind a comparison, a row for each run; `missing`: recipes that belong to the
-    comparison and have not run."""
+    """Length and seed of each training behind a comparison, a row for each run; `missing`: as in `report_joint`."""
     import pandas as pd
 
     used = {stage for group in groups for run in group.runs for stage in run.recipe.get("stages", ())}
@@ -297,11 +289,8 @@ def _steps_of(run: Run, stage: str) -> int | None:
 
 
 def film_joint(store: Store, console: Console, runs: Sequence[Run], output: Path) -> Path | None:
-    """Film a trial that all evaluated runs share, unless there is such a film that is newer than they are.
-
-    None where fewer than two were evaluated. Raises `UsageError` where they share no trial, NoRenderer where nothing
-    can be drawn.
-    """
+    """Film a trial that all evaluated runs share, unless there is a newer film; None where fewer than two were
+    evaluated. Raises `UsageError` where they share no trial, NoRenderer where nothing can be drawn."""
     tried, film = _having(runs, TRIALS), output / FILM
     if len(tried) < 2:
         return None

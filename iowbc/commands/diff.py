@@ -52,8 +52,7 @@ def difference_lines(a: Run, b: Run) -> Iterator[str]:
 
 
 def _either(store: Store, word: str) -> Run:
-    """The run that a word names. For a recipe file, or the name of one that has not run here, the recipe is read from
-    the file, and the artifacts are those it used last."""
+    """The run that a word names; the recipe of a file, or of a name that has not run here, is read from the file."""
     file = recipe_file(word)
     there = os.path.isfile(file)
     try:

@@ -22,9 +22,7 @@ def export(
     word: Annotated[
         str,
         typer.Argument(
-            help="Recipe, RECIPE/export, key, or export folder.",
-            metavar="WHAT",
-            autocompletion=completion.artifacts,
+            help="Recipe, RECIPE/export, key, or export folder.", metavar="WHAT", autocompletion=completion.artifacts
         ),
     ],
     folder: Annotated[Path, typer.Option("--web", help="Output folder of the web page.", metavar="DIR")],

@@ -46,9 +46,8 @@ def gc(
 ) -> None:
     """Remove what the options select, or list it. Raises `UsageError` if they select nothing.
 
-    unused: artifacts that no recipe ever used, and leftovers of processes that died; with `older_than` also those not
-    used for as long. recipes: their records, and artifacts that only they used. work: scratch files and checkpoints of
-    unfinished stages, and fully sent journals of dead processes. older_than: minimum age of everything removed [days].
+    unused: also leftovers of processes that died; with `older_than` [days] also artifacts not used for as long. work:
+    also scratch files, and fully sent journals of dead processes.
     """
     if not (unused or recipes or work or damaged):
         raise UsageError(

@@ -50,8 +50,7 @@ def status(as_json: options.AsJson = False, runs: options.RunsFolder = options.R
         console.print(table)
     if not (going_on or recipes):
         console.print(f"nothing has run in {store.runs.root} yet; `iowbc run RECIPE` starts", highlight=False)
-    aside = sorted(store.runs.damaged.glob(f"{DAMAGED_LINE}*"))
-    if aside:
+    if aside := sorted(store.runs.damaged.glob(f"{DAMAGED_LINE}*")):
         text = f"{len(aside)} damaged lines of MLflow's journals were put aside, as {shown_path(aside[-1])}"
         console.print(text, highlight=False)
     if waiting := backlog(store.runs):

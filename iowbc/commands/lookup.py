@@ -89,9 +89,8 @@ def known_names(store: Store) -> dict[str, tuple[str, ...]]:
 
 def last_used(store: Store, recipe: str) -> dict[str, Artifact]:
     """By stage: the artifacts that a recipe used last, as far as they are still stored."""
-    used = recall(store.runs, recipe).stages
-    found = {stage: store.find_any(stage, use.key) for stage, use in used.items()}
-    return {stage: artifact for stage, artifact in found.items() if artifact is not None}
+    used = recall(store.runs, recipe).stages.items()
+    return {stage: found for stage, use in used if (found := store.find_any(stage, use.key)) is not None}
 
 
 def _recipe(store: Store, word: str, name: str, published: Mapping[str, Mapping[str, Artifact]]) -> Run:
@@ -133,8 +132,8 @@ def _name_in(word: str) -> str:
 
 
 def _published(store: Store) -> dict[str, dict[str, Artifact]]:
-    """By recipe, and by stage: the artifacts that came with the repository, and those that they were made from, which
-    another recipe may have made first."""
+    """By recipe, and by stage: the artifacts that came with the repository, and those, also of other recipes, that they
+    were made from."""
     published = [one for stage in PIPELINE for one in store.published(stage)]
     newest = {one.manifest.key: store.find_any(one.manifest.stage, one.manifest.key) or one for one in published}
     found: dict[str, dict[str, Artifact]] = {}
@@ -174,8 +173,7 @@ def record_sweep(found: Sweep, folder: Path) -> None:
 
 
 def start_comparison(words: Sequence[str], folder: Path) -> None:
-    """Remove the tables and figures of an earlier comparison from a folder, and the film of other runs, and keep the
-    names of the new runs in it."""
+    """Remove what an earlier comparison left in a folder, but a film of the same runs, and record the new runs."""
     record = folder / COMPARISON_RECORD
     if record.is_file():
         for part in COMPARED:
@@ -264,8 +262,7 @@ def in_training(store: Store, word: str, stage: str | None) -> UnfinishedTrainin
 
 
 def input_of(store: Store, artifact: Artifact, stage: str) -> Artifact | None:
-    """The input of a stage that an artifact was made from; None where it read nothing of that stage. Raises
-    `UsageError` if it is gone."""
+    """The input of a stage that an artifact was made from, or None. Raises `UsageError` if it is gone."""
     manifest = artifact.manifest
     return input_artifact(store, artifact.ingredients, stage, f"{manifest.stage} {manifest.key[:12]}")
 
@@ -298,8 +295,7 @@ def policy_stages() -> list[str]:
 
 
 def world_of(resolved: Mapping[str, Any], generator: Artifact | None) -> "Specification":
-    """The world that a resolved recipe describes; `generator`: the reference generator that its policy was trained
-    on."""
+    """The world of a resolved recipe; `generator`: the reference generator that its policy was trained on."""
     from iowbc.robot.description import robot_folder
     from iowbc.task.specification import Specification
 

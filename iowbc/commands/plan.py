@@ -13,13 +13,14 @@ from rich.text import Text
 
 from iowbc.commands import options
 from iowbc.commands.printed import hanging, plain_table, print_json, stdout_console, tell
-from iowbc.commands.request import Request, in_order, planners
+from iowbc.commands.request import Request, in_order, planners, point_planners
 from iowbc.pipeline.console.wording import KEY_LENGTH, duration, short
 from iowbc.pipeline.planner import Planner
 from iowbc.pipeline.stage import Stage
 from iowbc.pipeline.stage_plan import Options, StagePlan
 from iowbc.pipeline.store.digests import data_digest
 from iowbc.pipeline.store.runs import Runs
+from iowbc.recipe.sweep import MOST_POINTS
 
 REASONS_SHOWN = 8
 """Reasons of a stage that are printed; the rest is counted."""
@@ -52,8 +53,6 @@ def plan(
     runs: options.RunsFolder = options.RUNS,
 ) -> None:
     """Print the plan of a recipe, a study or a sweep."""
-    from iowbc.commands.sweep import plan_sweep
-
     asked = Options(until, frozenset(force or ()), on_code_change=on_code_change)
     request, console = Request(recipe, overrides or (), Runs(runs), asked), stdout_console()
     if as_sweep or file is not None:
@@ -78,6 +77,27 @@ def print_plan(request: Request, console: Console, as_json: bool = False) -> Non
         _print(found[0].plan(), console)
     else:
         _print_several(planned(found), console)
+
+
+def plan_sweep(
+    asked: Request, file: Path | None, console: Console, as_json: bool = False, most: int = MOST_POINTS
+) -> None:
+    """Print the plan of each point of a sweep in a row, and the total. Raises `RecipeError`."""
+    sweep, of_points = point_planners(asked, file, most)
+    found = planned(of_points)
+    if as_json:
+        stages = {
+            name: [step_data(stage.step) | {"shared_with": stage.shared_with or None} for stage in own]
+            for name, own in found.items()
+        }
+        data = [
+            {"point": point.name, "settings": dict(point.settings), "stages": stages[point.name]}
+            for point in sweep.points
+        ]
+        print_json(console, {"sweep": sweep.name, "points": data})
+    else:
+        console.print(plan_table(found, "point"))
+        console.print(in_all(found), highlight=False)
 
 
 def planned(planners: Sequence[Planner]) -> Planned:

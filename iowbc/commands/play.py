@@ -1,11 +1,10 @@
 """`iowbc play`: shows or films a policy, or serves a page to drive it by hand and to replay its evaluation's trials."""
 
-import contextlib
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from contextlib import closing, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
@@ -26,35 +25,14 @@ from iowbc.pipeline.store.store import Store
 if TYPE_CHECKING:
     from iowbc.evaluation.play import Source
     from iowbc.evaluation.side_by_side import Actor
-
-MASS = 4.0
-"""Mass of the object by default [kg]."""
-
-
-@dataclass(frozen=True)
-class GameConditions:
-    """Fixed quantities of a skill's game; drawn if empty."""
-
-    mass: float | None = None
-    """Mass of the object [kg]."""
-    share: float | None = None
-    """Share of the weight that the human bears."""
-    partner: str | None = None
-    """Behaviour of the human; empty: the first that the skill has not met in training."""
-
-    def require_playable(self, request: PlayRequest) -> None:
-        """Raises UsageError for a game without an object or with random disturbances."""
-        if self.mass == 0.0 or request.disturbances:
-            raise UsageError("a game has an object (--mass above 0) and no random --disturbances: its human disturbs")
+    from iowbc.live.track import Played
 
 
 def play(
     word: Annotated[
         str,
         typer.Argument(
-            help="Recipe, RECIPE/STAGE, key, or export folder.",
-            metavar="WHAT",
-            autocompletion=completion.artifacts,
+            help="Recipe, RECIPE/STAGE, key, or export folder.", metavar="WHAT", autocompletion=completion.artifacts
         ),
     ],
     stage: Annotated[
@@ -88,32 +66,52 @@ def play(
     page, store, console = options.page_port(web, port), Store(Runs(runs)), stdout_console()
     request = PlayRequest(
         scene=scene,
-        mass=MASS if mass is None else mass,
+        mass=PlayRequest.mass if mass is None else mass,
         partner_share=partner_share or 0.0,
         seed=seed,
         disturbances=disturbances,
         video=video,
     )
-    fixed = GameConditions(mass, partner_share, partner)
-    if page is not None:
-        play_on_web(store, console, word, stage, request, fixed, page)
-        return
+    if page is not None and video is not None:
+        raise UsageError("--web and --video exclude each other: open the page, or make a film")
     options.require_extra("train", "iowbc play")
+    if page is not None:
+        options.require_extra("web", "--web")
+        options.require_free(page)
     close_on_termination()
     plan = planned(store, word)
     skill = skill_to_play(store, word, stage, plan)
     if skill is not None:
-        play_game(store, console, skill, request, fixed)
-        return
-    if partner is not None:
-        raise UsageError(f"{word}: --partner is the human of a skill's game, and this names no skill")
-    source = named_source(store, console, word, stage, request.scene, plan)
+        if mass == 0.0 or disturbances:
+            raise UsageError("a game has an object (--mass above 0) and no random --disturbances: its human disturbs")
+        if page is None:
+            _play_game(store, console, skill, request, partner, mass, partner_share)
+            return
+        if partner is not None:
+            raise UsageError("--web and --partner exclude each other: on the page you are the human")
+        from iowbc.live.game import GamePanel, GameRequest, GameSession
 
-    from iowbc.evaluation.play import play as play_episode
+        world, student, robot, task = playable_skill(store, skill, scene)
+        tell(console, f"skill of {skill.manifest.recipe}: you are its partner")
+        first = GameRequest(task, seed, mass=mass, share=partner_share)
+        _serve(console, page, GameSession(world, student, robot, first), panel=GamePanel)
+    elif page is not None:
+        from iowbc.live.session import Session
+
+        source, actor = _driven(store, console, word, stage, plan)
+        _serve(console, page, Session(source, request), evaluated=actor)
+    elif partner is not None:
+        raise UsageError(f"{word}: --partner is the human of a skill's game, and this names no skill")
+    else:
+        _play_episode(named_source(store, console, word, stage, scene, plan), request, console)
+
+
+def _play_episode(source: "Source", request: PlayRequest, console: Console) -> None:
+    """Play one episode in the viewer or as a film."""
+    from iowbc.evaluation.play import play
 
     try:
-        progress = film_progress(console, request.video)
-        episode, outcome, pictures = play_episode(source, request, progress=progress)
+        episode, outcome, pictures = play(source, request, progress=film_progress(console, request.video))
     except Interrupted as stopped:
         console.print(str(stopped), markup=False, highlight=False)
         return
@@ -121,17 +119,8 @@ def play(
     tell(console, f"{outcome.ending} after {outcome.seconds:.1f} of {episode.duration:.1f} s{made}")
 
 
-def play_on_web(
-    store: Store, console: Console, word: str, stage: str | None, request: PlayRequest, fixed: GameConditions, port: int
-) -> None:
-    """Serve the viewer in the browser until interrupted. Raises `UsageError` where it cannot begin."""
-    if request.video is not None:
-        raise UsageError("--web and --video exclude each other: open the page, or make a film")
-    options.require_extra("train", "iowbc play")
-    options.require_extra("web", "--web")
-    options.require_free(port)
-    close_on_termination()
-
+def _serve(console: Console, port: int, session: "Played", **shown: Any) -> None:
+    """Serve the page of a session until interrupted; `shown`: further arguments of `Page`."""
     from iowbc.live.page import Page
     from iowbc.live.server import serving
 
@@ -141,45 +130,37 @@ def play_on_web(
         there = f"ssh -L {port}:{options.HOST}:{port} THIS_MACHINE"
         console.print(f"(from another machine: {there}, and the same address there)", markup=False, highlight=False)
 
-    plan = planned(store, word)
-    skill = skill_to_play(store, word, stage, plan)
-    if skill is not None:
-        from iowbc.live.game import GamePanel, GameRequest, GameSession
-
-        fixed.require_playable(request)
-        if fixed.partner is not None:
-            raise UsageError("--web and --partner exclude each other: on the page you are the human")
-        found = playable_skill(store, skill, request.scene)
-        tell(console, f"skill of {skill.manifest.recipe}: you are its partner")
-        first = GameRequest(found.task, request.seed, mass=fixed.mass, share=fixed.share)
-        with GameSession(found.world, found.student, found.robot, first) as game, serving(port) as server:
-            Page(server, game, panel=GamePanel).run(ready)
-        return
-    source, actor = _driven(store, console, word, stage, plan)
-
-    from iowbc.live.session import Session
-
-    with Session(source, request) as session, serving(port) as server:
-        Page(server, session, actor).run(ready)
+    with closing(session), serving(port) as server:
+        Page(server, session, **shown).run(ready)
 
 
-def play_game(store: Store, console: Console, skill: Artifact, request: PlayRequest, fixed: GameConditions) -> None:
-    """Play a game of a skill in the viewer or as a film; its human alone knows the path. Raises `UsageError`."""
-    fixed.require_playable(request)
+def _play_game(
+    store: Store,
+    console: Console,
+    skill: Artifact,
+    request: PlayRequest,
+    partner: str | None,
+    mass: float | None,
+    share: float | None,
+) -> None:
+    """Play a game of a skill in the viewer or as a film; its human alone knows the path. Raises `UsageError`.
 
+    partner: behaviour of the human; None for the first that the skill has not met in training. mass, share: of the
+    object [kg], and of its weight that the human bears; None draws them.
+    """
     from iowbc.skill.game import NOMINAL, ROBOT
     from iowbc.skill.plan import AGENT, Plan
     from iowbc.skill.playing import film_game, show_game
     from iowbc.skill.single_game import SingleGame
 
-    found = playable_skill(store, skill, request.scene)
-    partners = found.world.recipe.skill.partners
+    world, student, robot, task = playable_skill(store, skill, request.scene)
+    partners = world.recipe.skill.partners
     humans = [kind for kind in (*partners.held_out, *partners.training) if kind != AGENT]
-    human = fixed.partner or humans[0]
+    human = partner or humans[0]
     require_known(human, "human of the skill", humans)
-    plan = Plan(found.task, human, known=False, mass=fixed.mass, share=fixed.share, seed=request.seed)
-    with contextlib.closing(SingleGame(found.world, found.student, NOMINAL | {ROBOT: found.robot}, plan)) as game:
-        title = f"{skill.manifest.recipe}: {plan.task}, {game.mass:.0f} kg, partner {human}, seed {request.seed}"
+    plan = Plan(task, human, known=False, mass=mass, share=share, seed=request.seed)
+    with closing(SingleGame(world, student, NOMINAL | {ROBOT: robot}, plan)) as game:
+        title = f"{skill.manifest.recipe}: {task}, {game.mass:.0f} kg, partner {human}, seed {request.seed}"
         tell(console, title)
         made = ""
         try:
@@ -200,7 +181,7 @@ def _driven(
     """The policy to drive by hand, and the trials of its evaluation."""
     found: Mapping[str, Artifact] = {}
     if not os.path.isdir(word):
-        with contextlib.suppress(UsageError):  # a first training has nothing finished yet
+        with suppress(UsageError):  # a first training has nothing finished yet
             found = named(store, word).artifacts
     evaluation = found.get("eval")
     if evaluation is not None and len(found) == 1:
@@ -208,7 +189,7 @@ def _driven(
         require_whole(store.runs, [played])
         source = whole_source(store, played)
     else:
-        source = named_source(store, console, word, stage, plan=plan)
+        source = named_source(store, console, word, stage, None, plan)
     try:
         return source, None if evaluation is None else evaluated_actor(store, evaluation)
     except UsageError as error:

@@ -61,18 +61,8 @@ def skill_to_play(store: Store, word: str, stage: str | None, plan: Planned = Pl
     return None
 
 
-@dataclass(frozen=True)
-class PlayableSkill:
-    """A trained skill, with what it commands, and the task that is played first."""
-
-    world: "Specification"
-    student: "Student"
-    robot: "TeacherNetwork"
-    task: str
-
-
-def playable_skill(store: Store, skill: Artifact, scene: str) -> PlayableSkill:
-    """A skill and the first task of a scene. Raises `UsageError`."""
+def playable_skill(store: Store, skill: Artifact, scene: str) -> "tuple[Specification, Student, TeacherNetwork, str]":
+    """World of a skill, its controller and its network, and the first task of a scene. Raises `UsageError`."""
     from iowbc.learning.storage import load_teacher
     from iowbc.skill.lower_layer import load_student
 
@@ -87,19 +77,14 @@ def playable_skill(store: Store, skill: Artifact, scene: str) -> PlayableSkill:
     require_known(scene, "scene with a transport task", first)
     world = world_of(skill.recipe, generator).deployed
     robot = load_teacher(skill.folder, "robot")[0]
-    return PlayableSkill(world, load_student(student.folder, world), robot, first[scene])
+    return world, load_student(student.folder, world), robot, first[scene]
 
 
 def named_source(
-    store: Store,
-    console: Console,
-    word: str,
-    stage: str | None,
-    scene: str | None = None,
-    plan: Planned | None = None,
+    store: Store, console: Console, word: str, stage: str | None, scene: str | None, plan: Planned
 ) -> "Source":
-    """The source that a word and `--stage` denote; prints a line if it is still in training. Raises `UsageError`, also
-    for a `scene` that its recipe lacks. `plan`: the word's plan, if known.
+    """The source that a word, with its plan, and `--stage` denote; prints a line if it is still in training. Raises
+    `UsageError`, also for a `scene` that its recipe lacks.
 
     A recipe file denotes the artifacts that `iowbc plan` reports as cached. The section `eval` of that file, or of the
     recipe's last run for a name, sets how they are played.
@@ -113,7 +98,6 @@ def named_source(
         tell(console, training.text)
         generator = input_artifact(store, training.ingredients, "rg-fit", f"{training.stage} {training.key[:12]}")
         return Source(world_of(training.recipe, generator), training.checkpoint, training.key)
-    plan = plan or planned(store, word)
     try:
         artifact = playable(store, word, stage, plan)
     except UsageError:
@@ -136,8 +120,7 @@ def named_source(
 
 
 def whole_source(store: Store, artifact: Artifact) -> "Source":
-    """A stored, verified policy with the world of its own recipe and the reference generator that it was trained with.
-    Raises `UsageError` if the generator is missing or damaged."""
+    """A policy with the world of its recipe. Raises `UsageError` if its reference generator is missing or damaged."""
     from iowbc.evaluation.play import Source, exported_source
 
     if artifact.manifest.stage == "export":

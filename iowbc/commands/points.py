@@ -93,8 +93,7 @@ def run_points(
 
 
 class PointThread(threading.Thread):
-    """A run in a thread of this process, which sees the stop request itself: for stages that are carried out
-    elsewhere."""
+    """A run in a thread, which sees the stop request itself: for stages that are carried out elsewhere."""
 
     def __init__(self, task: PointRun, abort: Callable[[], None]) -> None:
         """`abort`: aborts all runs at once."""

@@ -62,8 +62,7 @@ def print_json(console: Console, data: Any) -> None:
 
 
 def film_progress(console: Console, film: Path | None) -> Callable[[float, float], None]:
-    """A function that is called with the time drawn and the total [s] of a film, and prints them every few seconds;
-    without a film it prints nothing."""
+    """A function that prints the time drawn and the total [s] of a film, if there is one, every few seconds."""
     if film is None:
         return lambda seconds, duration: None
     tell(console, f"{film}: sets up the simulation")

@@ -132,8 +132,7 @@ def _redirect_to_devnull(descriptor: int) -> None:
 
 
 def described(error: Exception, arguments: Sequence[str]) -> str:
-    """Message of an unexpected error: a summary, the file with the details, and the next command. If that file cannot
-    be written, the message includes the details."""
+    """Message of an unexpected error: a summary, the file with the details or else these, and the next command."""
     again = f"to go on: {shlex.join(['iowbc', *arguments])}"
     if is_disk_full(error):
         full = what_is_full(error, (Path("runs"), Path(os.environ.get("TMPDIR", "/tmp"))))

@@ -28,8 +28,7 @@ def publish(
     ] = None,
     runs: options.RunsFolder = options.RUNS,
 ) -> None:
-    """Copy a recipe's artifacts, and those that it begins from, to `runs/published/`, except for the files in
-    `without`, and verify the copies.
+    """Copy a recipe's artifacts, and those that it begins from, to `runs/published/`, and verify the copies.
 
     Raises `UsageError` if a stage has not run, or if no artifact has a file in `without`. Code changes since an
     artifact was made are reported but accepted.
@@ -62,8 +61,7 @@ def publish(
         left_out = ", ".join(copy.manifest.omitted)
         lacks = [f"without {left_out}"] if left_out else []
         what = f"{artifact.manifest.stage}: {shown_path(copy.folder)} ({decimal(copy.size)})"
-        text = "; ".join([what, *lacks, *notes.get(key, ())])
-        tell(console, text)
+        tell(console, "; ".join([what, *lacks, *notes.get(key, ())]))
     size = published_size(request.runs)
     console.print(f"{decimal(size)} are published in all", highlight=False)
     if size > LARGEST_REPOSITORY:

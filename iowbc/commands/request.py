@@ -15,6 +15,7 @@ from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
 from iowbc.recipe.reading.loading import LoadedRecipe, load_recipe
 from iowbc.recipe.reading.study import load_study
+from iowbc.recipe.sweep import Sweep, load_sweep
 from iowbc.stages.registry import STAGES
 
 if TYPE_CHECKING:
@@ -57,9 +58,18 @@ def planners(request: Request) -> list[Planner]:
     return [prepared(loaded, request.runs, request.options) for loaded in found]
 
 
+def point_planners(asked: Request, file: Path | None, most: int) -> tuple[Sweep, list[Planner]]:
+    """The points of a sweep, at most `most`, and the planner of each; `file`: YAML file with further variations. Raises
+    `RecipeError` for all problems that can be found before a run."""
+    if asked.options.force:
+        text = "names a stage that points may share; force it in one of them with `iowbc run`"
+        raise RecipeError([Problem(f"--force {min(asked.options.force)}", text)])
+    found = load_sweep(asked.word, asked.overrides, file, most)
+    return found, [prepared(point.loaded, asked.runs, asked.options) for point in found.points]
+
+
 def prepared(loaded: LoadedRecipe, runs: Runs, options: Options) -> Planner:
-    """The planner of a recipe. Raises `RecipeError` for all that is wrong before a run, also with all that the robot
-    does not have or cannot reach."""
+    """The planner of a recipe. Raises `RecipeError`, also for what the robot does not have or cannot reach."""
     from iowbc.reference.ranges import wrong_ranges
     from iowbc.robot.description import robot_folder
 
@@ -80,8 +90,7 @@ def prepared(loaded: LoadedRecipe, runs: Runs, options: Options) -> Planner:
 
 
 def in_order(planner: Planner) -> list[Planner]:
-    """Planners of all that runs for a recipe: first those from whose artifacts it begins, where they are not stored,
-    then itself."""
+    """Planners of all that runs for a recipe: first those from whose missing artifacts it begins, then itself."""
     known: Plans = {}
     if planner.origins:
         planner.plan(known)

@@ -48,14 +48,12 @@ def print_results(runs: Runs, recipe: str, artifacts: Mapping[str, Artifact], co
         for film in sorted((folder / "videos").glob("*")):
             tell(console, f"film  {shown_path(film)}")
     for stage, artifact in artifacts.items():
-        chosen = ", ".join(f"{name} {figure(value)}" for name, value in headline(stage, artifact.metrics))
-        if chosen:
+        if chosen := ", ".join(f"{name} {figure(value)}" for name, value in headline(stage, artifact.metrics)):
             console.print(Text(f"{stage:<10}  {chosen}"), no_wrap=True, overflow="ellipsis")
     for stage, artifact in artifacts.items():
         _print_tables(artifact, folders[stage] / "tables", console)
     for folder in folders.values():
-        pictures = len(list((folder / "figures").glob("*")))
-        if pictures:
+        if pictures := len(list((folder / "figures").glob("*"))):
             tell(console, f"figures  {shown_path(folder / 'figures')} ({pictures})")
         if (folder / STEP).is_file():
             tell(console, f"controller  {shown_path(folder)}")

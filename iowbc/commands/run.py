@@ -184,8 +184,7 @@ def run_recipe(
     if tracker is not None and not delivered and backlog(request.runs):
         console.print("MLflow has not taken everything yet; the rest is sent in the background", highlight=False)
     if closing:
-        error_console = errors or Console(stderr=True)
-        error_console.print(closing, markup=False, highlight=False, soft_wrap=True)
+        tell(errors or Console(stderr=True), closing)
     return ending
 
 

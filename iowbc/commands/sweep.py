@@ -6,20 +6,20 @@ from collections.abc import Sequence
 from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
 
 from iowbc.commands import completion, options
 from iowbc.commands.lookup import named, record_sweep
-from iowbc.commands.plan import PlannedStage, in_all, plan_table, planned, step_data
+from iowbc.commands.plan import in_all, plan_sweep, planned
 from iowbc.commands.points import Endings, PointProcess, PointRun, PointThread, run_points
-from iowbc.commands.printed import print_json, shown_path, stdout_console, tell
+from iowbc.commands.printed import shown_path, stdout_console, tell
 from iowbc.commands.process import DONE, INTERRUPTED, STAGE_FAILED, RunEnding, ignoring_broken_outputs
-from iowbc.commands.request import Request, in_order, prepared
+from iowbc.commands.request import Request, in_order, point_planners
 from iowbc.commands.run import requested_cluster, run_recipe
-from iowbc.errors import Problem, RecipeError, UsageError
+from iowbc.errors import UsageError
 from iowbc.pipeline.console.board import Board
 from iowbc.pipeline.planner import Planner
 from iowbc.pipeline.stage_plan import Options
@@ -28,7 +28,7 @@ from iowbc.pipeline.store.runs import Runs, require_writable_runs
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.tracking.tracker import RunRecord, sweep_record
 from iowbc.processes import available_cores
-from iowbc.recipe.sweep import MOST_POINTS, Point, Sweep, load_sweep
+from iowbc.recipe.sweep import MOST_POINTS, Sweep
 from iowbc.results.table import drawn, markdown
 
 if TYPE_CHECKING:
@@ -77,18 +77,6 @@ def sweep(
         raise typer.Exit(run_sweep(request, file, jobs, points, stdout_console(), quiet))
 
 
-def ready(asked: Request, file: Path | None, most: int) -> tuple[Sweep, list[Planner]]:
-    """The points of a sweep, at most `most`, and the planner of each; `file`: YAML file with further variations.
-
-    Raises `RecipeError` for all problems that can be found before a run.
-    """
-    if asked.options.force:
-        text = "names a stage that points may share; force it in one of them with `iowbc run`"
-        raise RecipeError([Problem(f"--force {min(asked.options.force)}", text)])
-    found = load_sweep(asked.word, asked.overrides, file, most)
-    return found, [prepared(point.loaded, asked.runs, asked.options) for point in found.points]
-
-
 def _require_origins(asked: Request, planners: Sequence[Planner]) -> None:
     """Raises `UsageError` where points begin from what another recipe has not made yet: they would all wait for it."""
     missing = [origin for one in planners for origin in in_order(one)[:-1]]
@@ -101,35 +89,17 @@ def _require_origins(asked: Request, planners: Sequence[Planner]) -> None:
         raise UsageError(f"the points begin from what is not made yet; first\n  {lines}")
 
 
-def plan_sweep(
-    asked: Request, file: Path | None, console: Console, as_json: bool = False, most: int = MOST_POINTS
-) -> None:
-    """Print the plan of each point of a sweep in a row, and the total. Raises `RecipeError`."""
-    sweep, planners = ready(asked, file, most)
-    found = planned(planners)
-    if as_json:
-        data = [_data(point, found[point.name]) for point in sweep.points]
-        print_json(console, {"sweep": sweep.name, "points": data})
-    else:
-        console.print(plan_table(found, "point"))
-        console.print(in_all(found), highlight=False)
-
-
-def _data(point: Point, own: Sequence[PlannedStage]) -> dict[str, Any]:
-    stages = [step_data(stage.step) | {"shared_with": stage.shared_with or None} for stage in own]
-    return {"point": point.name, "settings": dict(point.settings), "stages": stages}
-
-
 def run_sweep(
     asked: Request, file: Path | None, jobs: int | None, most: int, console: Console, quiet: bool = False
 ) -> int:
     """Run all points; returns the exit code. Raises `RecipeError`, or `UsageError` if another recipe has to run first.
 
-    file, most: see `ready`. jobs: points that run in parallel; default 1, on a cluster as many as its cores allow.
+    jobs: points that run in parallel; default 1, on a cluster as many as its cores allow. file, most: see
+    `point_planners`.
 
     A failed point does not stop the others. Stored artifacts are used, and unfinished stages are resumed.
     """
-    found, planners = ready(asked, file, most)
+    found, planners = point_planners(asked, file, most)
     _require_origins(asked, planners)
     runs, execution = asked.runs, planners[0].loaded.recipe.execution
     options.require_extra("train", "iowbc sweep")

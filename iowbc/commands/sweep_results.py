@@ -53,8 +53,7 @@ def _metric(run: Run, name: str) -> float:
 
 
 def _chosen(runs: Sequence[Run]) -> tuple[str, ...]:
-    """Main metrics in which points differ, those of the last stages preferred; if none differs, those of the last
-    stage."""
+    """Main metrics in which points differ, those of the last stages first; if none differs, those of the last stage."""
     known = list(
         dict.fromkeys(
             f"{stage} {name}"

@@ -1,6 +1,6 @@
 """Mouse drags in the browsers: the dragged body, its point, and the pointer."""
 
-from collections.abc import Callable, Coroutine, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -64,12 +64,7 @@ class Drags:
         ]
 
     def follow(self, handle: Any, body: str) -> None:
-        """Lets a mesh of a body be dragged."""
-        for modifier in (None, "shift"):
-            handle.on_drag("left", modifier=modifier)(self.callback(body))
-
-    def callback(self, body: str) -> Callable[["viser.SceneNodeDragEvent[Any]"], Coroutine[Any, Any, None]]:
-        """Event handler for drags of one body. Invalid positions end a drag."""
+        """Lets a mesh of a body be dragged. Invalid positions end a drag."""
 
         async def moved(event: "viser.SceneNodeDragEvent[Any]") -> None:
             """Asynchronous, because only such callbacks run in order."""
@@ -78,4 +73,5 @@ class Drags:
             if event.phase != "end" and (np.abs(places) < FARTHEST).all():
                 self._held[event.client_id] = Drag(body, places[0], places[1], places[2], event.modifier is not None)
 
-        return moved
+        for modifier in (None, "shift"):
+            handle.on_drag("left", modifier=modifier)(moved)

@@ -97,8 +97,7 @@ class Drawing:
             handle.remove()
         self._model = model
         links = set(self._robot.tree.bodies)
-        everything = {model.body(index).name for index in range(model.nbody)}
-        with_looks, primitive = list(looks(model)), list(collision_shapes(model, everything))
+        with_looks, primitive = list(looks(model)), list(collision_shapes(model))
         self._bodies = {
             model.body(name).id: self._scene.add_frame(f"/world/bodies/{name}", show_axes=False)
             for name in dict.fromkeys(shape.body for shape in [*with_looks, *primitive])

@@ -1,7 +1,4 @@
-"""A game of the skill layer whose human is a person: the mouse leads a spring and damper at the object's far handle.
-
-Beside it are the controls and figures of the game.
-"""
+"""A game of the skill layer whose human is a person: the mouse leads a spring and damper at the object's far handle."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -15,7 +12,7 @@ from iowbc.live.drag import Drag
 from iowbc.live.drawing import GameMarks
 from iowbc.live.moment import Moment, MomentRecorder
 from iowbc.live.panel import LAST_SEED, Button, ControlPanel, table_row
-from iowbc.live.track import PAST, WINDOW, Played, Track, track_of
+from iowbc.live.track import PAST, WINDOW, Played, Track
 from iowbc.robot import rotations
 from iowbc.sim.rendering.forces import Force
 from iowbc.skill.game import NOMINAL
@@ -68,8 +65,8 @@ class GameSession(Played):
         self.request, self._game = request, SingleGame(self.world, self._student, networks, plan)
         self._lower = self._game.lower
         self.robot, self.period = self._lower.robot, self._lower.period
-        self._recorder: MomentRecorder | None = None
         self._signals = {name: np.zeros((1, 1)) for name in ("covered", "length", "lateral", "share")}
+        self._recorder = MomentRecorder(self._lower, self._signals)
         self.reset()
 
     def reset(self) -> None:
@@ -79,9 +76,8 @@ class GameSession(Played):
         away = self._lower.simulation.partner.at - state.object_position
         handle = rotations.rotate_inverse(state.object_quaternion, away)[0]
         self.marks = GameMarks(self._game.lines(), handle)
-        self._recorder = self._recorder or MomentRecorder(self._lower, self._signals)
         title = f"{self.request.task}, {self._game.mass:.0f} kg"
-        self.track = track_of(self._recorder, self.world, title, round(PAST / self.period))
+        self.track = Track(self._recorder, self.world, title, round(PAST / self.period))
         self.track.moments.append(self._look())
 
     def step(self) -> None:
@@ -118,7 +114,6 @@ class GameSession(Played):
         force = simulation.state.partner_force[0]
         signals["covered"][:], signals["length"][:] = now.covered, now.covered + now.left
         signals["lateral"][:], signals["share"][:] = now.lateral, force[2]
-        assert self._recorder is not None
         moment = self._recorder.look(self._game.seconds)
         pull = Force("partner", simulation.partner.at[0], force * [1.0, 1.0, 0.0])
         others = tuple(force for force in moment.forces if force.kind != "partner")
@@ -146,9 +141,6 @@ class GamePanel(ControlPanel):
     @property
     def conditions(self) -> GameRequest:
         return replace(self._session.request, task=self.task.value, seed=int(self.seed.value), robot=self.rival.value)
-
-    def steer(self) -> None:
-        """The mouse steers."""
 
     def press(self, button: Button) -> None:
         if button == "next task":

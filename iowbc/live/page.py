@@ -10,7 +10,7 @@ from iowbc.errors import Interrupted
 from iowbc.evaluation.side_by_side import Actor
 from iowbc.live.drawing import Drawing
 from iowbc.live.panel import LIVE, ControlPanel, DrivingPanel
-from iowbc.live.track import PAST, Played, Track, played_again, trial_titles
+from iowbc.live.track import PAST, Played, Track, played_again, trial_title
 
 PICTURES = 1.0 / 25.0
 """Time between two pictures [s]."""
@@ -38,7 +38,7 @@ class Page:
     ) -> None:
         """`panel`: makes the controls that fit the session, with the titles of the evaluated trials."""
         self.server, self.session, self._evaluated = server, session, evaluated
-        self._trials = [] if evaluated is None else trial_titles(evaluated.trials)
+        self._trials = [] if evaluated is None else [trial_title(row) for _, row in evaluated.trials.iterrows()]
         self.panel = panel(server.gui, session, self._trials)
         self.drawing = Drawing(server, session.robot, session.view)
         self.paused = False
@@ -113,9 +113,7 @@ class Page:
         else:
             row = self._evaluated.trials.iloc[self._trials.index(title)]
             try:
-                self.track = played_again(
-                    self._evaluated, row, lambda: bool(self.panel.showing.value != title), self._tell
-                )
+                self.track = played_again(self._evaluated, row, lambda: self.panel.showing.value != title, self._tell)
             except Interrupted:
                 return
             time_slider.min, time_slider.max = 0.0, max(self.track.end, self.track.period)

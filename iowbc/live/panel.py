@@ -11,15 +11,13 @@ from typing import Any, Literal
 import numpy as np
 import viser
 
-from iowbc.arrays import Array
 from iowbc.control.command import COMMAND, VELOCITY, nominal_command
 from iowbc.evaluation.play_request import PlayRequest
 from iowbc.evaluation.trials.plan import DIRECTIONS
 from iowbc.live.drag import Pushed
 from iowbc.live.drawing import ShownParts
-from iowbc.live.moment import Moment
 from iowbc.live.session import Session
-from iowbc.live.track import PAST, WINDOW, Played, Track, TrackFigures
+from iowbc.live.track import PAST, WINDOW, Played, Track
 from iowbc.recipe.task.commands import Commands
 
 Button = Literal["pause", "reset", "push robot", "push object", "next task"]
@@ -40,6 +38,10 @@ LABELS = {
     "height": "height [m]",
     "pitch": "lean [rad]",
 }
+UNITS = {"E_v": "m/s", "E_psi": "rad", "E_alpha": "rad", "E_h": "m"}
+SYMBOLS = {"E_v": "E<sub>v</sub>", "E_psi": "E<sub>ψ</sub>", "E_alpha": "E<sub>α</sub>", "E_h": "E<sub>h</sub>"}
+CELL = "padding:0 0.6em 0 0;text-align:right"
+NAME = "padding:0 0.6em 0 0;text-align:left"
 
 
 class ControlPanel(ABC):
@@ -78,8 +80,7 @@ class ControlPanel(ABC):
     def conditions(self) -> Any:
         """The requested episode, as an argument of `Played.begin`."""
 
-    @abstractmethod
-    def steer(self) -> None:
+    def steer(self) -> None:  # noqa: B027 (in a game the mouse steers)
         """Hands the controls over to the session before a step."""
 
     @abstractmethod
@@ -129,14 +130,34 @@ class DrivingPanel(ControlPanel):
             self._conditions()
 
     def steer(self) -> None:
-        self._session.wanted[:] = self.command
+        self._session.wanted[:] = [slider.value for slider in self._command]
 
     def press(self, button: Button) -> None:
         what: Pushed = "robot" if button == "push robot" else "object"
         self._session.push(what, self.direction.value, self.impulse.value)
 
     def figures_at(self, track: Track, place: int) -> str:
-        return figures(track.moments[place], track.readings(place))
+        """The command and the state at a moment, and the errors of the seconds before."""
+        signals, readings = track.moments[place].signals, track.readings(place)
+        going, wanted = signals["system_velocity"], signals["commanded_velocity"]
+        rows = [
+            ("forward", wanted[0], going[0], "m/s"),
+            ("left", wanted[1], going[1], "m/s"),
+            ("height", signals["height_command"][0], signals["pelvis_height"][0], "m"),
+            ("lean", signals["torso_pitch_command"][0], signals["torso_pitch"][0], "rad"),
+        ]
+        asked = [table_row(name, f"{first:+.2f}", f"{second:+.2f} {unit}") for name, first, second, unit in rows]
+        errors = [table_row(SYMBOLS[name], f"{readings.errors[name]:.3f} {unit}") for name, unit in UNITS.items()]
+        hands = "–" if isnan(readings.weight_in_hands) else f"{100 * readings.weight_in_hands:.0f} %"
+        worst = sorted(readings.saturated.items(), key=lambda pair: -pair[1])
+        limits = ", ".join(f"{escape(name.removesuffix('_joint'))} {100 * share:.0f} %" for name, share in worst)
+        head = table_row("", "command", "is")
+        return (
+            f"<div style='padding:0 1em;font-size:0.8em'><table>{head}{''.join(asked)}</table>"
+            f"<p style='margin:0.4em 0'>Means of the last {WINDOW:g} s:</p><table>{''.join(errors)}"
+            f"{table_row('weight in the hands', hands)}</table>"
+            f"<p style='margin:0.4em 0'>Joints at their torque limit: {limits or 'none'}</p></div>"
+        )
 
     def _commands(self, commands: Commands) -> list[viser.GuiSliderHandle]:
         """A slider for each entry of the command, over what training commands."""
@@ -179,11 +200,6 @@ class DrivingPanel(ControlPanel):
             slider.value = 0.0
 
     @property
-    def command(self) -> Array:
-        """The command that the sliders ask for, (11,)."""
-        return np.array([slider.value for slider in self._command])
-
-    @property
     def conditions(self) -> PlayRequest:
         return replace(
             self._request,
@@ -193,35 +209,6 @@ class DrivingPanel(ControlPanel):
             seed=int(self.seed.value),
             disturbances=self.disturbances.value,
         )
-
-
-UNITS = {"E_v": "m/s", "E_psi": "rad", "E_alpha": "rad", "E_h": "m"}
-SYMBOLS = {"E_v": "E<sub>v</sub>", "E_psi": "E<sub>ψ</sub>", "E_alpha": "E<sub>α</sub>", "E_h": "E<sub>h</sub>"}
-CELL = "padding:0 0.6em 0 0;text-align:right"
-NAME = "padding:0 0.6em 0 0;text-align:left"
-
-
-def figures(moment: Moment, readings: TrackFigures) -> str:
-    """The command and the state at a moment, and the errors of the seconds before."""
-    signals = moment.signals
-    going, wanted = signals["system_velocity"], signals["commanded_velocity"]
-    rows = [
-        ("forward", wanted[0], going[0], "m/s"),
-        ("left", wanted[1], going[1], "m/s"),
-        ("height", signals["height_command"][0], signals["pelvis_height"][0], "m"),
-        ("lean", signals["torso_pitch_command"][0], signals["torso_pitch"][0], "rad"),
-    ]
-    asked = [table_row(name, f"{first:+.2f}", f"{second:+.2f} {unit}") for name, first, second, unit in rows]
-    errors = [table_row(SYMBOLS[name], f"{readings.errors[name]:.3f} {unit}") for name, unit in UNITS.items()]
-    hands = "–" if isnan(readings.weight_in_hands) else f"{100 * readings.weight_in_hands:.0f} %"
-    worst = sorted(readings.saturated.items(), key=lambda pair: -pair[1])
-    limits = ", ".join(f"{escape(name.removesuffix('_joint'))} {100 * share:.0f} %" for name, share in worst)
-    return (
-        f"<div style='padding:0 1em;font-size:0.8em'><table>{table_row('', 'command', 'is')}{''.join(asked)}</table>"
-        f"<p style='margin:0.4em 0'>Means of the last {WINDOW:g} s:</p><table>{''.join(errors)}"
-        f"{table_row('weight in the hands', hands)}</table>"
-        f"<p style='margin:0.4em 0'>Joints at their torque limit: {limits or 'none'}</p></div>"
-    )
 
 
 def table_row(name: str, *values: str) -> str:

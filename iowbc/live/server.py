@@ -32,8 +32,7 @@ UNUSED = (
 
 
 def refusal(headers: Any, connected: int) -> tuple[HTTPStatus, str] | None:
-    """Reason why a request is not answered: a page from elsewhere, which the user also visits, would steer the
-    robot."""
+    """Reason why a request is not answered: another page that the user visits would steer the robot."""
     hosts, origins = headers.get_all("Host"), headers.get_all("Origin")
     if len(hosts) != 1 or _name(f"http://{hosts[0]}") not in LOCAL_NAMES:
         return HTTPStatus.FORBIDDEN, f"Host {hosts}: open the page as http://127.0.0.1:PORT or http://localhost:PORT\n"
@@ -53,10 +52,7 @@ def _name(address: str) -> str | None:
 
 @contextmanager
 def own_pages_only() -> Iterator[None]:
-    """Servers started within the block reject requests with a `refusal`.
-
-    Raises RuntimeError if viser starts its servers in a way that bypasses this check.
-    """
+    """Servers started within the block reject requests with a `refusal`. Raises RuntimeError if viser bypasses this."""
     serve, begun = library.serve, []
 
     def watched(*given: Any, process_request: Any, **settings: Any) -> Any:

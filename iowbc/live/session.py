@@ -1,5 +1,6 @@
 """A policy that is driven by hand: one environment, commands, pushes, and what happened in the last minute."""
 
+import contextlib
 import time
 from collections.abc import Sequence
 from dataclasses import replace
@@ -14,8 +15,9 @@ from iowbc.evaluation.play_request import PlayRequest
 from iowbc.evaluation.trials.plan import DIRECTIONS
 from iowbc.live.drag import Drag, Pushed, spring_pulls
 from iowbc.live.moment import MomentRecorder
-from iowbc.live.track import PAST, Played, recorded, track_of
+from iowbc.live.track import PAST, Played, Track, recorded
 from iowbc.recipe.evaluation.sequences import Segment
+from iowbc.task.planned_pushes import in_world
 
 AN_HOUR = (Segment(duration=600.0),) * 6
 """Commands for the maximum length of an episode: one hour."""
@@ -31,7 +33,8 @@ class Session(Played):
         self.source = source
         self.wanted = nominal_command(source.world.recipe.task.commands)
         """The command to approach, (11,); it may be changed in place."""
-        self._pull = {"robot": np.zeros(3), "object": np.zeros(3)}
+        self.pull = spring_pulls(())
+        """Steady forces, world frame, (3,) each [N]."""
         self._open(request)
 
     def _open(self, request: PlayRequest) -> None:
@@ -40,7 +43,7 @@ class Session(Played):
         self.environment.batch.guidance.commander.steer(self.wanted)
         self.robot, self.period = self.environment.batch.robot, self.environment.period
         self._load()
-        self._recorder: MomentRecorder | None = None
+        self._recorder = MomentRecorder(self.environment.batch, recorded(self.environment))
         self.reset()
 
     def _load(self) -> None:
@@ -51,26 +54,19 @@ class Session(Played):
         self._policy = open_policy(self.source, self.environment)
 
     def reset(self) -> None:
-        environment = self.environment
-        self._observation = environment.reset()
+        self._observation = self.environment.reset()
         self._policy.reset(np.ones(1, np.bool_))
         self._steps = 0
         self._pushes = {"robot": (np.zeros(3), 0), "object": (np.zeros(3), 0)}
-        self._recorder = recorder = self._recorder or MomentRecorder(environment.batch, recorded(environment))
         title = f"{self.request.scene}, {self.request.object_mass:g} kg"
-        self.track = track_of(recorder, self.source.world, title, round(PAST / environment.period))
-        self._look = recorder.look
-        self.track.moments.append(self._look(0.0))
+        self.track = Track(self._recorder, self.source.world, title, round(PAST / self.period))
+        self.track.moments.append(self._recorder.look(0.0))
 
-    def refresh(self) -> bool:
+    def refresh(self) -> None:
         policy = self.source.policy
-        try:
-            if not policy.is_file() or policy.stat().st_mtime <= self.written:
-                return False
-            self._load()
-        except (FileNotFoundError, Damaged):  # the training has ended meanwhile
-            return False
-        return True
+        with contextlib.suppress(FileNotFoundError, Damaged):  # the training has ended meanwhile
+            if policy.is_file() and policy.stat().st_mtime > self.written:
+                self._load()
 
     def step(self) -> None:
         if self.track.ending:
@@ -87,31 +83,23 @@ class Session(Played):
             self.track.ending = str(infos[0]["end"])
             self._policy.reset(done)
         else:
-            self.track.moments.append(self._look(self._steps * environment.period))
+            self.track.moments.append(self._recorder.look(self._steps * self.period))
 
     def push(self, what: Pushed, direction: str, impulse: float) -> None:
         """Push for `PUSH_DURATION`; `direction`: of `DIRECTIONS`, from the commanded heading; `impulse` [N·s]."""
-        forward, left = DIRECTIONS[direction]
-        heading = float(self.environment.batch.memory.heading_reference[0])
-        cosine, sine = np.cos(heading), np.sin(heading)
-        steps = max(1, round(PUSH_DURATION / self.environment.period))
-        force = impulse / (steps * self.environment.period)
-        along = np.array([cosine * forward - sine * left, sine * forward + cosine * left, 0.0])
-        self._pushes[what] = (force * along, steps)
+        forward, left = np.array(DIRECTIONS[direction])[:, None]
+        along = in_world(forward, left, self.environment.batch.memory.heading_reference[:1])[0]
+        steps = max(1, round(PUSH_DURATION / self.period))
+        self._pushes[what] = (impulse / (steps * self.period) * along, steps)
 
     def drag(self, drags: Sequence[Drag]) -> None:
         """Apply the bounded spring forces of mouse drags; bodies without a drag are released."""
-        for what, force in spring_pulls(drags).items():
-            self.pull(what, force)
-
-    def pull(self, what: Pushed, force: Array) -> None:
-        """A steady force, world frame, (3,) [N], until the next call."""
-        self._pull[what] = np.asarray(force, np.float64)
+        self.pull = spring_pulls(drags)
 
     def _force(self, what: Pushed) -> Array:
         force, left = self._pushes[what]
         self._pushes[what] = (force, max(0, left - 1))
-        return self._pull[what] + (force if left else 0.0)
+        return self.pull[what] + (force if left else 0.0)
 
     def close(self) -> None:
         self.environment.close()

@@ -35,12 +35,9 @@ def looks(model: Any) -> Iterator[BodyMesh]:
     return _merged(model, lambda geom: model.geom_group[geom] < HIDDEN_GROUP)
 
 
-def collision_shapes(model: Any, bodies: set[str]) -> Iterator[BodyMesh]:
-    """The primitive collision shapes of some bodies, visible or hidden."""
-    mesh = GEOM.mjGEOM_MESH.value
-    return _merged(
-        model, lambda geom: model.geom_type[geom] != mesh and model.body(model.geom_bodyid[geom]).name in bodies
-    )
+def collision_shapes(model: Any) -> Iterator[BodyMesh]:
+    """The primitive collision shapes, visible or hidden."""
+    return _merged(model, lambda geom: model.geom_type[geom] != GEOM.mjGEOM_MESH.value)
 
 
 def _merged(model: Any, wanted: Callable[[int], bool]) -> Iterator[BodyMesh]:

@@ -3,8 +3,9 @@
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -41,37 +42,29 @@ class TrackFigures:
     """Part of the time at the torque limit, of the joints that ever were."""
 
 
-@dataclass
 class Track:
-    """The moments of one episode, one a control step; see `track_of`."""
+    """The moments of a recorder's present episode, one a control step."""
 
-    title: str
-    model: Any
-    """Model for drawing."""
-    period: float
-    """Control period [s]."""
-    gait_period: float
-    """Averaging window of v_sys [s]."""
-    held_weight: float
-    """Weight of a held object [N]; 0 without one."""
-    joints: tuple[str, ...]
-    moments: deque[Moment]
-    ending: str = ""
-    """Reason of the episode's end; empty before it."""
-
-    @property
-    def start(self) -> float:
-        """Time of the first moment that is kept [s]."""
-        return self.moments[0].seconds
+    def __init__(self, recorder: MomentRecorder, world: Specification, title: str, kept: int | None = None) -> None:
+        """`kept`: how many of the last moments it keeps."""
+        self.title, self.model, self.period = title, recorder.model, recorder.batch.period
+        self.moments: deque[Moment] = deque(maxlen=kept)
+        self.ending = ""
+        """Reason of the episode's end; empty before it."""
+        self.held_weight = GRAVITY * recorder.held_mass
+        """Weight of a held object [N]; 0 without one."""
+        self._gait_period = 1.0 / world.recipe.task.references.gait.frequency
+        self._joints = recorder.batch.robot.joints
 
     @property
     def end(self) -> float:
-        """Time of the last one [s]."""
+        """Time of the last moment [s]."""
         return self.moments[-1].seconds
 
     def place(self, seconds: float) -> int:
         """Index of the moment nearest to a time [s]."""
-        return int(np.clip(round((seconds - self.start) / self.period), 0, len(self.moments) - 1))
+        steps = round((seconds - self.moments[0].seconds) / self.period)
+        return int(np.clip(steps, 0, len(self.moments) - 1))
 
     def readings(self, place: int) -> TrackFigures:
         """The figures at the moment of an index."""
@@ -79,18 +72,18 @@ class Track:
         seen = [self.moments[index] for index in range(first, place + 1)]
         signals = {name: np.stack([moment.signals[name] for moment in seen])[:, None] for name in RECORDED}
         trace = trace_of(signals, 0, len(seen), self.period)
-        deviations = deviations_from_clamped(trace, max(1, round(self.gait_period / self.period)))
+        deviations = deviations_from_clamped(trace, max(1, round(self._gait_period / self.period)))
         shares = trace.joint_saturation.mean(axis=0)
         means, judged = deviations.means(), self.held_weight > Success().least_weight
         return TrackFigures(
             errors={name: means[name] for name in ERRORS},
             weight_in_hands=load_metrics(trace, self.held_weight, judged)["weight_in_hands"],
-            saturated={name: float(share) for name, share in zip(self.joints, shares, strict=True) if share > 0},
+            saturated={name: float(share) for name, share in zip(self._joints, shares, strict=True) if share > 0},
         )
 
 
 class Played(ABC):
-    """Episodes for a page. Close it, or use it as a context manager."""
+    """Episodes for a page, to be closed."""
 
     track: Track
     """Record of the current episode."""
@@ -131,15 +124,8 @@ class Played(ABC):
     def close(self) -> None:
         """Ends the simulation."""
 
-    def refresh(self) -> bool:
-        """Reload the policy if it is a checkpoint that was rewritten; returns True if so."""
-        return False
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *ended: object) -> None:
-        self.close()
+    def refresh(self) -> None:  # noqa: B027 (a game has no checkpoint)
+        """Reload the policy if it is a checkpoint that was rewritten."""
 
 
 def recorded(environment: VectorEnv) -> dict[str, Array]:
@@ -147,54 +133,26 @@ def recorded(environment: VectorEnv) -> dict[str, Array]:
     return {name: environment.signals[name] for name in RECORDED}
 
 
-def track_of(recorder: MomentRecorder, world: Specification, title: str, kept: int | None = None) -> Track:
-    """An empty track of a recorder's present episode in a world; `kept`: how many of the last moments it keeps."""
-    return Track(
-        title=title,
-        model=recorder.model,
-        period=recorder.batch.period,
-        gait_period=1.0 / world.recipe.task.references.gait.frequency,
-        held_weight=GRAVITY * recorder.held_mass,
-        joints=recorder.batch.robot.joints,
-        moments=deque(maxlen=kept),
-    )
-
-
-def trial_titles(trials: pd.DataFrame) -> list[str]:
-    """A title for each row of `trials.parquet`: the trial's conditions and end."""
-    return [_title(row) for _, row in trials.iterrows()]
-
-
-def _title(row: "pd.Series[Any]") -> str:
+def trial_title(row: "pd.Series[Any]") -> str:
+    """A title for a row of `trials.parquet`: the trial's conditions and end."""
     push = f", push {row['impulse']:g} N·s" if row["impulse"] else ""
     case = row["suite"] if row["suite"] == row["case"] else f"{row['suite']}: {row['case']}"
     return f"{case}, {row['mass']:g} kg{push}, trial {row['trial']}: {row['end']} after {row['seconds']:.1f} s"
 
 
 def played_again(
-    actor: Actor,
-    row: "pd.Series[Any]",
-    interrupted: Callable[[], bool] = lambda: False,
-    progress: Callable[[float], None] = lambda seconds: None,
+    actor: Actor, row: "pd.Series[Any]", interrupted: Callable[[], bool], progress: Callable[[float], None]
 ) -> Track:
     """The trial of a row of the actor's table, taken down step by step.
 
     progress: receives the time reached within the trial [s]. Raises Interrupted once `interrupted()` is true.
     """
-    environment = VectorEnv(actor.world, num_envs=1, workers=0, seed=0, episodes=(replayed(row),))
     seen: list[Moment] = []
-    recorder: list[MomentRecorder] = []
-
-    def look(seconds: float) -> None:
-        if not recorder:
-            recorder.append(MomentRecorder(environment.batch, recorded(environment)))
-        seen.append(recorder[0].look(seconds))
-
-    try:
-        outcome = play_in(environment, in_batch(actor.policy, row), interrupted, progress, look)[0]
-        track = track_of(recorder[0], actor.world, _title(row))
+    with closing(VectorEnv(actor.world, num_envs=1, workers=0, seed=0, episodes=(replayed(row),))) as environment:
+        recorder, policy = MomentRecorder(environment.batch, recorded(environment)), in_batch(actor.policy, row)
+        look = recorder.look
+        outcome = play_in(environment, policy, interrupted, progress, lambda seconds: seen.append(look(seconds)))[0]
+        track = Track(recorder, actor.world, trial_title(row))
         track.ending = outcome.ending
         track.moments.extend(seen)
         return track
-    finally:
-        environment.close()

@@ -23,7 +23,7 @@ class PlannedPushes:
     def force(self, step: Indices, heading: Array) -> Array:
         """World force over the period that begins at `step` (n,), (n, 3) [N]; `heading`: commanded, (n,) [rad]."""
         forward, left = (self._strength * ((step >= self._first) & (step < self._last))[:, None]).T
-        return _in_world(forward, left, heading)
+        return in_world(forward, left, heading)
 
 
 class PlannedPulls:
@@ -46,10 +46,10 @@ class PlannedPulls:
         acting = (time > self._begin) & (time < self._end)
         size = np.where(acting, np.sin(self._rate * np.where(acting, time - self._begin, 0.0)), 0.0)
         forward, left = (self._force * size[:, None]).T
-        return _in_world(forward, left, heading)
+        return in_world(forward, left, heading)
 
 
-def _in_world(forward: Array, left: Array, heading: Array) -> Array:
+def in_world(forward: Array, left: Array, heading: Array) -> Array:
     """Horizontal vectors of a heading frame as world vectors, (n, 3)."""
     cosine, sine = np.cos(heading), np.sin(heading)
     return np.stack([cosine * forward - sine * left, sine * forward + cosine * left, np.zeros(len(heading))], axis=1)

@@ -43,11 +43,7 @@ def write_page(exported: Path, out: Path, cache: Path, say: Callable[[str], None
     for name in (exported_folder.SETTLE, exported_folder.STEP, exported_folder.CONTRACT):
         shutil.copyfile(exported / name, out / name)
     robot = load_robot(world.robot)
-    about = {
-        "scenes": web_scenes(world, robot),
-        "first": first_scene(world.recipe),
-        "golden": golden_vectors(exported),
-    }
+    about = {"scenes": web_scenes(world, robot), "first": first_scene(world.recipe), "golden": golden_vectors(exported)}
     (out / SCENES).write_text(json.dumps(about, separators=(",", ":")), encoding="utf-8")
     bundle(parts, out)
 
@@ -62,10 +58,8 @@ def golden_vectors(exported: Path) -> dict[str, list[Any]] | None:
 
 
 def npm_parts(cache: Path, say: Callable[[str], None]) -> Path:
-    """The `node_modules` of the pinned versions in a cache folder, fetched where they are not there yet.
-
-    Raises `UsageError` without Node.js and npm, or where npm cannot fetch.
-    """
+    """The `node_modules` of the pinned versions in a cache folder, fetched where they are not there yet. Raises
+    `UsageError` without Node.js and npm, or where npm cannot fetch."""
     folder = parts_folder(cache)
     if (folder / "node_modules").is_dir():
         return folder / "node_modules"

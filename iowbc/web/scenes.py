@@ -1,5 +1,4 @@
-"""The simulation of a scene for the browser: its MJCF, the numbers that MJCF rounds, its start, and its shapes for the
-eye."""
+"""The simulation of a scene for the browser: MJCF, the numbers that MJCF rounds, start, and shapes for the eye."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -43,7 +42,7 @@ HEAVIEST = 1.5
 def web_scenes(world: Specification, robot: Robot) -> dict[str, Any]:
     """Every scene that a page can show, by name, at the nominal values of all that training draws."""
     scenes = world.recipe.simulation.scenes
-    return {name: _web_scene(world, robot, name) for name, scene in scenes if _playable(scene)}
+    return {name: _web_scene(world, robot, scene, name) for name, scene in scenes if _playable(scene)}
 
 
 def first_scene(recipe: Recipe) -> str:
@@ -63,10 +62,8 @@ def _playable(scene: Scene) -> bool:
     return scene.kind in KINDS and (scene.object is None or scene.object.mesh is None)
 
 
-def _web_scene(world: Specification, robot: Robot, name: str) -> dict[str, Any]:
-    recipe: Recipe = world.recipe
-    scene: Scene = getattr(recipe.simulation.scenes, name)
-    simulation = begun(world, robot, name)
+def _web_scene(world: Specification, robot: Robot, scene: Scene, name: str) -> dict[str, Any]:
+    recipe, simulation = world.recipe, begun(world, robot, name)
     started, drawn = simulation.worlds[0], simulation.drawn
     layout, physics = started.layout, recipe.simulation.physics
     timing = Timing(simulation.period, physics.timestep, 0)
@@ -109,16 +106,12 @@ def _web_scene(world: Specification, robot: Robot, name: str) -> dict[str, Any]:
         "most": HEAVIEST * scene.object.mass,
         "inertia_per_mass": shape.principal.tolist(),
     }
-    frictions = {key: float(drawn[key][0]) for key in ("slip_force", "surface_friction")}
-    hold = _hold(started, robot, scene, shape.about_axes, frictions)
+    hold = _hold(started, robot, scene, shape.about_axes, drawn)
     return described | {"object": thing, "hold": hold, "hands": hands, "wrists": wrists}
 
 
 def begun(world: Specification, robot: Robot, name: str, mass: float = np.nan) -> Simulation:
-    """One simulation of a scene at the start of an episode, undisturbed and with nothing drawn.
-
-    `mass` of the object [kg]; NaN for its nominal one.
-    """
+    """One undisturbed simulation of a scene at the start of an episode; `mass` of the object [kg], NaN: nominal."""
     recipe = world.recipe
     quiet = recipe.simulation.randomization.model_copy(update={"enabled": False})
     alone = recipe.simulation.partner.model_copy(update={"enabled": False})
@@ -149,7 +142,7 @@ def _plain(spec: Any) -> str:
     return spec.to_xml()
 
 
-def _hold(world: World, robot: Robot, scene: Scene, inertia: Array, drawn: Mapping[str, float]) -> dict[str, Any]:
+def _hold(world: World, robot: Robot, scene: Scene, inertia: Array, drawn: Mapping[str, Array]) -> dict[str, Any]:
     """Parameters of the grasp in addition to its connection or contact with the object."""
     grasp, layout, model = scene.grasp, world.layout, world.model
     compliant = grasp.kind == "compliant"
@@ -166,8 +159,8 @@ def _hold(world: World, robot: Robot, scene: Scene, inertia: Array, drawn: Mappi
         "handover": grasp.handover / world.timing.period,
         "squeeze": 0.0 if compliant else grasp.squeeze,
         "by_friction": grasp.by_friction if compliant else 0.0,
-        "friction": drawn["surface_friction"],
-        "slip_force": drawn["slip_force"],
+        "friction": float(drawn["surface_friction"][0]),
+        "slip_force": float(drawn["slip_force"][0]),
         "about": float(inertia[1] + grasp.height**2),
         **grasp.model_dump(include={"strength", "torsion", "stability", "stiffness", "swing_damping"}),
     }

@@ -4,20 +4,10 @@ import socket
 from pathlib import Path
 
 import pytest
-from rich.console import Console
 
 from iowbc.commands import options
-from iowbc.commands.play import GameConditions, play_on_web
+from iowbc.commands.play import play
 from iowbc.errors import UsageError
-from iowbc.evaluation.play_request import PlayRequest
-from iowbc.pipeline.store.runs import Runs
-from iowbc.pipeline.store.store import Store
-
-
-def play(folder: Path, port: int, **asked: Path) -> None:
-    play_on_web(
-        Store(Runs(folder)), Console(), "first", None, PlayRequest(video=asked.get("video")), GameConditions(), port
-    )
 
 
 def test_a_taken_port_is_told_before_anything_is_loaded_with_one_that_is_free(tmp_path: Path) -> None:
@@ -26,16 +16,16 @@ def test_a_taken_port_is_told_before_anything_is_loaded_with_one_that_is_free(tm
         other.listen()
         port = other.getsockname()[1]
         with pytest.raises(UsageError, match=rf"port {port} is taken; try --port \d+"):
-            play(tmp_path, port)
+            play("first", web=True, port=port, runs=tmp_path)
 
 
 def test_a_page_is_no_film(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="--web and --video exclude each other"):
-        play(tmp_path, 8080, video=tmp_path / "box.mp4")
+        play("first", web=True, port=8080, video=tmp_path / "box.mp4", runs=tmp_path)
 
 
 def test_without_viser_the_command_that_installs_it_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     found = options.find_spec
     monkeypatch.setattr(options, "find_spec", lambda name: None if name == "viser" else found(name))
     with pytest.raises(UsageError, match=r"pip install 'iowbc\[web\]'"):
-        play(tmp_path, 8080)
+        play("first", web=True, port=8080, runs=tmp_path)

@@ -1,9 +1,9 @@
 """A robot that is left to its reference, to be driven by hand, drawn by its primitive shapes."""
 
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
-import numpy as np
 import pytest
 from exported_policies import made_up_generator
 from standing_still import StandingStill
@@ -34,7 +34,7 @@ def opened(source: Source) -> Iterator[Session]:
     with pytest.MonkeyPatch.context() as changed:
         changed.setattr(appearance, "installed_meshes", lambda robot: iter(()))
         changed.setattr(driven, "open_policy", lambda source, environment: StandingStill())
-        with Session(source, PlayRequest(mass=4.0)) as session:
+        with closing(Session(source, PlayRequest(mass=4.0))) as session:
             yield session
 
 
@@ -42,8 +42,7 @@ def opened(source: Source) -> Iterator[Session]:
 def session(opened: Session) -> Session:
     """At the start of an episode with 4 kg, told to stand, let alone."""
     opened.wanted[:] = nominal_command(opened.source.world.recipe.task.commands)
-    opened.pull("robot", np.zeros(3))
-    opened.pull("object", np.zeros(3))
+    opened.drag(())
     opened.begin(PlayRequest(mass=4.0)) if opened.request.mass != 4.0 else opened.reset()
     return opened
 

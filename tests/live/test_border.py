@@ -203,12 +203,12 @@ def test_what_a_mouse_drags_is_pulled_until_it_lets_go_or_its_browser_disconnect
         for ending in ("end", "disconnect"):
             drag(client, "start", HELD)
             drag(client, "update", (0.1, 0.2, 0.8))
-            turned(page, 60.0, until=lambda: bool(page.session._pull["robot"].any()))
-            assert page.session._pull["robot"] == pytest.approx([0.0, STIFFNESS * 0.2, 0.0], abs=1e-6)
-            assert not page.session._pull["object"].any()
+            turned(page, 60.0, until=lambda: bool(page.session.pull["robot"].any()))
+            assert page.session.pull["robot"] == pytest.approx([0.0, STIFFNESS * 0.2, 0.0], abs=1e-6)
+            assert not page.session.pull["object"].any()
             drag(client, "end", (0.1, 0.2, 0.8)) if ending == "end" else client.close()
-            turned(page, 60.0, until=lambda: not page.session._pull["robot"].any())
-            assert not page.session._pull["robot"].any()
+            turned(page, 60.0, until=lambda: not page.session.pull["robot"].any())
+            assert not page.session.pull["robot"].any()
 
 
 @pytest.mark.parametrize("place", [(float("nan"), 0, 0), (0, float("-inf"), 0), (1e300, 0, 0)])
@@ -223,8 +223,8 @@ def test_a_drag_to_nowhere_is_no_force_and_the_next_one_is(page: Page, place: An
         turned(page, 60.0, until=lambda: bool(page.panel.speed.value == 0.4))
         assert page.drawing.drags.now(np.zeros(3)) == []
         drag(client, "update", (0.1, 0.2, 0.8))
-        turned(page, 60.0, until=lambda: bool(page.session._pull["robot"].any()))
-        assert np.linalg.norm(page.session._pull["robot"]) == pytest.approx(30.0)
+        turned(page, 60.0, until=lambda: bool(page.session.pull["robot"].any()))
+        assert np.linalg.norm(page.session.pull["robot"]) == pytest.approx(30.0)
 
 
 @pytest.mark.parametrize("place", [(0.1, 0.2), "xyz", None, [[1.0]] * 3])

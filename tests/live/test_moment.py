@@ -41,7 +41,7 @@ def test_the_reference_is_the_posture_at_the_start_and_parts_from_it_when_pushed
     knee = session.track.model.body("left_knee_link").id
     start = session.track.moments[0]
     assert start.reference[knee] == pytest.approx(start.bodies[knee], abs=1e-6)
-    session.pull("robot", np.array([0.0, 0.0, -250.0]))
+    session.pull["robot"] = np.array([0.0, 0.0, -250.0])
     run(session, 10)
     last = session.track.moments[-1]
     assert np.abs(last.reference[knee, :3] - last.bodies[knee, :3]).max() > 0.005
@@ -62,8 +62,7 @@ def test_shapes_are_those_of_the_model(session: Session) -> None:
     model = session.track.model
     box = next(shape for shape in looks(model) if shape.body == "object")
     assert np.ptp(box.vertices, axis=0) == pytest.approx(2.0 * model.geom("object").size)
-    links = {model.body(index).name for index in range(model.nbody)}
-    for shape in collision_shapes(model, links):
+    for shape in collision_shapes(model):
         body = model.body(shape.body).id
         geoms = np.flatnonzero((model.geom_bodyid == body) & (model.geom_type != mujoco.mjtGeom.mjGEOM_MESH.value))
         reach = max(np.linalg.norm(model.geom_pos[geom]) + model.geom_rbound[geom] for geom in geoms)

@@ -21,7 +21,7 @@ from iowbc.live.page import SETTLED, Page
 from iowbc.live.panel import LIVE
 from iowbc.live.server import serving
 from iowbc.live.session import Session
-from iowbc.live.track import trial_titles
+from iowbc.live.track import trial_title
 from iowbc.recipe.evaluation.sequences import Segment
 
 STANDING = (Segment(duration=0.2, ramp=0.0),)
@@ -173,7 +173,7 @@ def test_a_trial_is_looked_through_as_it_was_recorded(session: Session, actor: A
     )
     recorded = play_in(environment, StandingStill())[0].trace
     environment.close()
-    (title,) = trial_titles(actor.trials)
+    title = trial_title(row)
     assert title == f"lifting, 6 kg, trial 0: finished after {row['seconds']} s"
     with serving(0) as server:
         page = Page(server, session, actor)

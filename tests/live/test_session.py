@@ -1,6 +1,7 @@
 """A policy that is driven by hand."""
 
 import os
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -73,11 +74,11 @@ def test_a_push_moves_who_is_pushed(session: Session) -> None:
 
 def test_a_drag_lasts_until_it_is_let_go(session: Session) -> None:
     simulation = session.environment.batch.simulation
-    session.pull("object", np.array([0.0, 8.0, 3.0]))
+    session.pull["object"] = np.array([0.0, 8.0, 3.0])
     run(session, 3)
     assert simulation.impulse_force(0) == pytest.approx([0.0, 8.0, 3.0])
     assert [force.kind for force in session.track.moments[-1].forces].count("push") == 1
-    session.pull("object", np.zeros(3))
+    session.drag(())
     session.step()
     assert not simulation.impulse_force(0).any()
 
@@ -102,13 +103,13 @@ def test_without_a_mass_nothing_is_held_and_nothing_can_be_pushed_but_the_robot(
 
 
 def test_after_its_end_an_episode_rests_until_it_is_begun_again(session: Session) -> None:
-    session.pull("robot", np.array([600.0, 0.0, -200.0]))
+    session.pull["robot"] = np.array([600.0, 0.0, -200.0])
     run(session, 150)
     assert session.track.ending in ("fallen", "dropped")
     count = len(session.track.moments)
     session.step()
     assert len(session.track.moments) == count
-    session.pull("robot", np.zeros(3))
+    session.drag(())
     session.reset()
     run(session, 2)
     assert (session.track.ending, len(session.track.moments)) == ("", 3)
@@ -125,14 +126,16 @@ def test_a_checkpoint_that_is_written_again_is_taken_while_the_episode_goes_on(
         return StandingStill()
 
     monkeypatch.setattr(driven, "open_policy", opening)
-    with Session(replace(source, policy=checkpoint, key="k" * 64), PlayRequest()) as session:
-        assert not session.refresh()
+    with closing(Session(replace(source, policy=checkpoint, key="k" * 64), PlayRequest())) as session:
+        session.refresh()
+        assert loaded == [b"1"]
         run(session, 2)
         checkpoint.write_bytes(b"2")
         os.utime(checkpoint, (session.written + 5, session.written + 5))
-        assert session.refresh()
+        session.refresh()
         assert loaded == [b"1", b"2"]
         run(session, 2)
         assert len(session.track.moments) == 5
         checkpoint.unlink()
-        assert not session.refresh()
+        session.refresh()
+        assert loaded == [b"1", b"2"]
