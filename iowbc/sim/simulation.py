@@ -81,7 +81,7 @@ class Simulation:
         self._episode_key = self._key.copy()
         self.episode = np.zeros(n, np.int64)
         self.clock = np.zeros(n, np.int64)
-        self.state = SimulationState.empty(n, len(robot.joints))
+        self.state = SimulationState(n, len(robot.joints))
         self.state.has_object[:] = [model.object is not None for model in models]
         self.target = np.tile(robot.default_position, (n, 1))
         self.feed = np.zeros((n, partner.FEED))

@@ -54,7 +54,7 @@ class World:
         self.model = compile_scene(robot, physics, scene, timing)
         if physics.pd == "explicit":
             require_stable(self.model, robot, timing)
-        self.layout = ModelIndex.of(self.model, robot)
+        self.layout = ModelIndex(self.model, robot)
         self.batch = Batch(self.model, len(rows), nthread=1)
         self.fields = ModelFields(self.batch, self.layout, scene, timing)
         self._flags = self.batch.expand("opt.disableflags")

@@ -53,7 +53,7 @@ class Batch:
         self._joint_reference = np.tile(self.robot.default_position, (n, 1))
         self.scenes = np.array(scenes)
         """Name of each environment's scene, (n,)."""
-        self.memory = EpisodeState.blank(n, len(self.robot.interaction), len(self.robot.support))
+        self.memory = EpisodeState(n, len(self.robot.interaction), len(self.robot.support))
         self._schedule = schedule = Schedule(
             task, self.memory, environments=np.arange(first, last), seed=setup.seed, trials=episodes
         )

@@ -19,7 +19,7 @@ EVERY = np.arange(COUNT)
 def schedule(recipe: Recipe):
     def make(replay: float) -> Schedule:
         task = changed(recipe, "task.curriculum.replay", replay).task
-        memory = EpisodeState.blank(COUNT, 14, 15)
+        memory = EpisodeState(COUNT, 14, 15)
         return Schedule(task, memory, environments=EVERY, seed=0, trials=None)
 
     return make
