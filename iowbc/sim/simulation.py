@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from iowbc import counter_random as random
 from iowbc.arrays import Array, Indices, Keys
+from iowbc.control.layout import EVERY
 from iowbc.recipe.evaluation.evaluation import Drake
 from iowbc.recipe.simulation.simulation import SimulationSettings as Recipe
 from iowbc.robot import rotations
@@ -21,7 +22,7 @@ from iowbc.sim.episode_draws import Draws
 from iowbc.sim.sensing import Sensing
 from iowbc.sim.state import Period, SimulationState
 from iowbc.sim.timing import Timing
-from iowbc.sim.world import EVERY, World, make_world
+from iowbc.sim.world import World, make_world
 
 STARTS_AT_ZERO = (
     *("joint_acceleration", "slipped", "partner_force", "partner_velocity", "partner_energy", "partner_share"),
@@ -57,14 +58,13 @@ class Simulation:
         self.envs = np.asarray(envs, np.int64)
         self.n = n = len(self.envs)
         self.period = 1.0 / control_frequency
-        self.scene_names = tuple(scenes)
         self.fixed: dict[str, Array] = {}
-        models = [_scene(recipe, name) for name in self.scene_names]
+        models = [_scene(recipe, name) for name in scenes]
         if len(models) != n:
             raise ValueError(f"{n} environments but {len(models)} scenes")
         timing = Timing(self.period, recipe.physics.timestep, recipe.randomization.longest_latency)
-        self._scenes = tuple(dict.fromkeys(self.scene_names))
-        rows = [np.flatnonzero(np.array(self.scene_names) == name) for name in self._scenes]
+        self._scenes = tuple(dict.fromkeys(scenes))
+        rows = [np.flatnonzero(np.array(scenes) == name) for name in self._scenes]
         self.worlds = tuple(
             make_world(robot, recipe.physics, _scene(recipe, name), own, timing, drake)
             for name, own in zip(self._scenes, rows, strict=True)
@@ -301,7 +301,7 @@ class Simulation:
             values[...] = saved[name]
         for scene, world in zip(self._scenes, self.worlds, strict=True):
             world.restore(_under(f"scene/{scene}/", saved))
-        self.partner.restored()
+        self.partner.derive()
 
     def world_of(self, env: int) -> tuple[World, int]:
         """The world of an environment, and its index there."""

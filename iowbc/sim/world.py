@@ -7,6 +7,7 @@ import numpy as np
 from mujoco.batch import Batch, SimulationError
 
 from iowbc.arrays import Array, Indices, Mask, as_slice
+from iowbc.control.layout import EVERY
 from iowbc.errors import UsageError
 from iowbc.recipe.evaluation.evaluation import Drake
 from iowbc.recipe.simulation.scene import Scene
@@ -30,8 +31,6 @@ MOTION_ALONE = sum(
     getattr(mujoco.mjtDisableBit, f"mjDSBL_{part}").value for part in ("CONTACT", "CONSTRAINT", "SENSOR", "ACTUATION")
 )
 """Flags that disable all of MuJoCo but positions, velocities and inertia of the bodies."""
-EVERY = slice(None)
-"""All simulations."""
 FEET, HANDS, THING = slice(0, 2), slice(2, 4), 4
 """Places of the bodies whose forces are kept."""
 AT_LIMIT = 0.999

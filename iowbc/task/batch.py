@@ -23,13 +23,7 @@ from iowbc.task.layout import full_layout
 from iowbc.task.motion import Motion
 from iowbc.task.planned_pushes import PlannedPulls, PlannedPushes
 from iowbc.task.privileged import Truth
-from iowbc.task.record.recorder import (
-    count_endings,
-    count_pushes,
-    count_step,
-    write_signals,
-    write_trial_signals,
-)
+from iowbc.task.record import recorder
 from iowbc.task.schedule import Schedule
 from iowbc.task.vector.shared import Buffers
 
@@ -94,7 +88,9 @@ class Batch:
         for name in ("reward", "done", "truncated", "terminal_observation"):
             self.buffers[name][:] = 0
         self._observe(moved)
-        write_signals(self.buffers, self.simulation.state, moved, self.memory, Ending.none(self.n), self.period)
+        recorder.write_signals(
+            self.buffers, self.simulation.state, moved, self.memory, Ending.none(self.n), self.period
+        )
 
     def reseed(self, seeds: NDArray[np.uint64]) -> None:
         """Reseeds all random number streams from seeds (n,)."""
@@ -134,10 +130,10 @@ class Batch:
     def record(self, judgement: Judgement, action: Array) -> None:
         """Writes signals and counters of the step just made with an action (n, 15)."""
         simulation, ending = self.simulation, judgement.ending
-        count_step(self.buffers, judgement, self.memory)
-        write_signals(self.buffers, simulation.state, judgement.motion, self.memory, ending, self.period)
+        recorder.count_step(self.buffers, judgement, self.memory)
+        recorder.write_signals(self.buffers, simulation.state, judgement.motion, self.memory, ending, self.period)
         if self._schedule.repeats:
-            write_trial_signals(self.buffers, simulation, action * self._scale)
+            recorder.write_trial_signals(self.buffers, simulation, action * self._scale)
 
     def feed_partner(self, feed: Array) -> None:
         """Writes the entries of the command that the partner receives, (n, 4)."""
@@ -161,7 +157,7 @@ class Batch:
         buffers["terminal_observation"][which] = buffers["observation"][which]
         buffers["episode_return"][which] = memory.total[which]
         buffers["episode_length"][which] = memory.steps[which]
-        count_endings(buffers, ending, self._schedule.causes(ending), which)
+        recorder.count_endings(buffers, ending, self._schedule.causes(ending), which)
         self._schedule.promote(ending, which)
         self._observe(self.begin(which), which)
 
@@ -175,7 +171,7 @@ class Batch:
         self.simulation.hold(self._schedule.scales(which, key), which)
         self.simulation.reset(which, joints, base_pitch=pitch, key=key)
         memory.infeasible[which] = self.simulation.infeasible[which]
-        count_pushes(self.buffers, self._pushing, memory, which)
+        recorder.count_pushes(self.buffers, self._pushing, memory, which)
         moved = self.judge.motion(self.simulation.state)
         memory.heading_reference[which] = moved.heading[which]
         memory.heading_offset[which] = (self.simulation.measured.heading[:, 0] - moved.heading)[which]
@@ -222,7 +218,7 @@ class Batch:
         schedule = self._schedule
         own = vars(self.memory) | {"key": schedule.key, "episode_key": schedule.episode_key}
         saved = {f"task/{name}": values.copy() for name, values in own.items()}
-        saved |= {f"buffer/{name}": values.copy() for name, values in self.buffers.arrays.items()}
+        saved |= {f"buffer/{name}": values.copy() for name, values in self.buffers.items()}
         return saved | self.simulation.snapshot()
 
     def restore(self, saved: Mapping[str, Array]) -> None:
@@ -231,7 +227,7 @@ class Batch:
             values[...] = saved[f"task/{name}"]
         schedule = self._schedule
         schedule.key[:], schedule.episode_key[:] = saved["task/key"], saved["task/episode_key"]
-        for name, values in self.buffers.arrays.items():
+        for name, values in self.buffers.items():
             values[:] = saved[f"buffer/{name}"]
         self.simulation.reseed(schedule.key)
         self.simulation.restore(saved)

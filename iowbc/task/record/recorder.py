@@ -11,7 +11,7 @@ from iowbc.task.endings import Ending
 from iowbc.task.episode_state import EpisodeState
 from iowbc.task.judge import Judgement
 from iowbc.task.motion import Motion
-from iowbc.task.record.signals import ACTION_SIGNAL, COUNTERS, ERRORS, KINDS, REASONS
+from iowbc.task.record.signals import ACTION_SIGNAL, COUNTERS, ERRORS, KINDS
 from iowbc.task.rewards import terms
 from iowbc.task.vector.shared import Buffers
 
@@ -106,9 +106,8 @@ def count_endings(buffers: Buffers, ending: Ending, causes: dict[str, Mask], whi
     counters[which, COLUMN["return"]] += buffers["episode_return"][which]
     for cause, found in causes.items():
         counters[which, COLUMN[f"fell/{cause}"]] += found[which]
-    reasons = ending.reasons()
-    for name in REASONS:
-        counters[which, COLUMN[name]] += reasons[name][which]
+    for reason, found in ending.reasons().items():
+        counters[which, COLUMN[reason]] += found[which]
 
 
 def count_pushes(buffers: Buffers, pushing: Mask, memory: EpisodeState, which: NDArray[np.intp]) -> None:

@@ -1,6 +1,6 @@
 """The weighted sum of the terms, with its parts."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from operator import attrgetter
 
@@ -55,16 +55,13 @@ def term_names(recipe: Reward) -> tuple[str, ...]:
 class RewardFunction:
     """The reward of a recipe. Terms without a weight, now or later, are computed only if they are in `TRACKED`."""
 
-    def __init__(
-        self, recipe: Reward, period: float, terms: Mapping[str, Term] | None = None, *, own: bool = False
-    ) -> None:
-        """`period`: control period [s]; `terms`: by dotted path in the recipe, by default those of the table; `own`:
-        execute the user-defined terms, which are zero otherwise. Raises StageFailed for one that cannot be used."""
-        table = TERMS if terms is None else terms
-        self._columns = len(table) + len(recipe.own_terms)
-        seconds = dict.fromkeys(ONCE, 1.0) | {path: 0.0 for path in table if path.partition(".")[0] in recipe.without}
-        functions = {**table, **(load_terms(recipe) if own else {})}
-        settings = {path: attrgetter(path)(recipe) for path in table}
+    def __init__(self, recipe: Reward, period: float, *, own: bool = False) -> None:
+        """`period`: control period [s]; `own`: execute the user-defined terms, which are zero otherwise. Raises
+        StageFailed for one that cannot be used."""
+        self._columns = len(TERMS) + len(recipe.own_terms)
+        seconds = dict.fromkeys(ONCE, 1.0) | {path: 0.0 for path in TERMS if path.partition(".")[0] in recipe.without}
+        functions = TERMS | (load_terms(recipe) if own else {})
+        settings = {path: attrgetter(path)(recipe) for path in TERMS}
         settings |= {f"own.{name}": term for name, term in recipe.own_terms.items()}
         weighted = {
             path: _weighted(column, function, settings[path], seconds.get(path, period))
