@@ -82,7 +82,8 @@ class World:
         self._squeeze, self._grip = self._grasp(scene)
         self._rolling = Rolling(self.batch, self.layout, self.fields, scene) if scene.kind == "push" else None
         self._memory: dict[str, Array] = {} if self._rolling is None else {"touch": self._rolling.touch}
-        self._memory |= {} if self._grip is None else self._grip.arrays()
+        if self._grip is not None:
+            self._memory |= {"grip_angle": self._grip.angle, "grip_rate": self._grip.rate}
         self._warning_counts = self.batch.warning[:, :, 1]
         self._warnings = self._warning_counts.copy()
         self.before = self.batch.state.copy()
@@ -325,7 +326,7 @@ class World:
         return own | {"state": self.batch.state.copy(), "warnings": self._warnings.copy()} | self.fields.snapshot()
 
     def restore(self, values: Mapping[str, Array]) -> None:
-        """Inverse of `snapshot`, or of `record` for all; the simulations then continue bit for bit."""
+        """Inverse of `snapshot`: the simulations then continue bit for bit."""
         self.fields.restore(values)
         for name, array in self._memory.items():
             array[...] = values[name]

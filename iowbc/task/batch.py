@@ -143,11 +143,11 @@ class Batch:
 
     def finish(self, judgement: Judgement) -> None:
         """Writes the results of the step, and starts a new episode where one has ended."""
-        memory, buffers, ending, scored = self.memory, self.buffers, judgement.ending, judgement.scored
-        memory.total += scored.reward
-        memory.tracking += scored.tracking
+        memory, buffers, ending, reward = self.memory, self.buffers, judgement.ending, judgement.terms.sum(axis=1)
+        memory.total += reward
+        memory.tracking += judgement.tracking
         done = ending.done
-        buffers["reward"][:] = scored.reward
+        buffers["reward"][:] = reward
         buffers["done"][:] = done
         buffers["truncated"][:] = ending.truncated
         self._observe(judgement.motion)

@@ -116,7 +116,7 @@ def test_weights_of_a_robot_that_walks_take_over_with_its_level(monkeypatch: pyt
     step = SimpleNamespace(command=np.zeros((4, 11)))
     level, none = np.array([0.2, 0.75, 1.0, 2.0]), np.zeros(4, bool)
     monkeypatch.setattr(reward, "TERMS", table)
-    found = RewardFunction(recipe, 0.02)(step, none, level).terms  # type: ignore[arg-type]
+    found = RewardFunction(recipe, 0.02)(step, none, level)[0]  # type: ignore[arg-type]
     column = list(TERMS).index
     assert found[:, column("alive")] == pytest.approx([0.01, 0.02, 0.03, 0.03])
     assert found[:, column("termination")] == pytest.approx([0.0, 0.0, 0.0, -25.0])

@@ -16,18 +16,6 @@ CONTRACT = "it takes a Step (iowbc/task/rewards/table.py) and returns a finite n
 
 
 @dataclass(frozen=True)
-class RewardResult:
-    """The reward of one step."""
-
-    reward: Array
-    """(n,)."""
-    terms: Array
-    """Each term's part of the reward, in the order of `term_names`, (n, terms)."""
-    tracking: Array
-    """The scores of the terms `TRACKED`, between 0 and 1, (n, tracked)."""
-
-
-@dataclass(frozen=True)
 class WeightedTerm:
     """A term with its weight and kernel width."""
 
@@ -79,9 +67,9 @@ class RewardFunction:
             if changed not in self._terms:
                 self._terms.append(changed)
 
-    def __call__(self, step: Step, diverged: Mask, level: Array) -> RewardResult:
-        """Reward of one control step at levels of locomotion (n,). `diverged` environments, (n,), get the penalty of a
-        fall and no other term."""
+    def __call__(self, step: Step, diverged: Mask, level: Array) -> tuple[Array, Array]:
+        """Each term's part of the reward of a step, (n, terms), and scores of the terms `TRACKED`, (n, tracked).
+        `level`: of locomotion, (n,). `diverged` environments, (n,), get the penalty of a fall and no other term."""
         terms = np.zeros((len(step.command), self._columns))
         for term in self._terms:
             terms[:, term.column] = term.value(step)
@@ -94,7 +82,7 @@ class RewardFunction:
             part = ((level - later.begin) / (later.end - later.begin)).clip(0.0, 1.0)
             weights = weights + part[:, None] * self._change
         terms *= weights
-        return RewardResult(reward=terms.sum(axis=1), terms=terms, tracking=tracking)
+        return terms, tracking
 
 
 def _weighted(column: int, function: Term, setting: float | Kernel | CustomTerm, seconds: float) -> WeightedTerm:
