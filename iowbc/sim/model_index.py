@@ -54,8 +54,7 @@ class ModelIndex:
         self.palms = _pair(geoms, "left_palm", "right_palm")
         """Geoms of the palms, (2,)."""
         self.momentum = np.array([model.M_rowadr[3 : 6 + count] + axis for axis in range(3)])
-        """Entries of the inertia matrix that couple the base's translation to the robot's other velocities,
-        (3, speeds)."""
+        """Entries of the inertia matrix that couple the base's translation to the robot's other speeds, (3, speeds)."""
         self.momentum_speeds = slice(3, 6 + count)
         """The velocities of `momentum` in qvel."""
         self.past_forces = slice(0, 0) if self.object is None else _past_forces(model, HANDS)

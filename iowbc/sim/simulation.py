@@ -63,11 +63,11 @@ class Simulation:
         if len(models) != n:
             raise ValueError(f"{n} environments but {len(models)} scenes")
         timing = Timing(self.period, recipe.physics.timestep, recipe.randomization.longest_latency)
-        self._scenes = tuple(dict.fromkeys(scenes))
-        rows = [np.flatnonzero(np.array(scenes) == name) for name in self._scenes]
+        by_name = dict(zip(scenes, models, strict=True))
+        self._scenes = tuple(by_name)
         self.worlds = tuple(
-            make_world(robot, recipe.physics, _scene(recipe, name), own, timing, drake)
-            for name, own in zip(self._scenes, rows, strict=True)
+            make_world(robot, recipe.physics, model, np.flatnonzero(np.array(scenes) == name), timing, drake)
+            for name, model in by_name.items()
         )
         self._owner, self._index = np.empty(n, np.int64), np.empty(n, np.int64)
         """World of each environment, and its place there, (n,)."""
@@ -134,8 +134,7 @@ class Simulation:
         return gathered
 
     def hold(self, fixed: Mapping[str, Array], which: Indices | slice = EVERY) -> None:
-        """Holds quantities of some environments at values (k,) from the next reset on; NaN draws. Other held quantities
-        stay held."""
+        """Holds quantities of some environments at values (k,) from the next reset on; NaN draws, others stay."""
         unknown = [name for name in fixed if name not in self.drawn]
         if unknown:
             raise KeyError(f"no randomised quantities {unknown}; there are: {', '.join(sorted(self.drawn))}")
@@ -233,8 +232,7 @@ class Simulation:
         self._deliver()
 
     def _handover_force(self, wrench: Array) -> None:
-        """Supports the robot's share of a held object's weight between the hands, fading out over T: f = (1 - share) m
-        g (1 - t / T)."""
+        """Bears the robot's share of a held object between the hands, fading out: f = (1 - share) m g (1 - t / T)."""
         if (self.clock < self._handover).any():
             left = np.maximum(self._handover - self.clock, 0.0) / np.maximum(self._handover, 1.0)
             drawn, lifted = self.drawn, np.zeros((self.n, 3))
@@ -283,16 +281,14 @@ class Simulation:
         return delayed | {f"simulation/{name}": values for name, values in own.items()}
 
     def snapshot(self) -> dict[str, Array]:
-        """Copies of the complete state, one row per environment, whatever processes they are spread over; `restore`
-        continues bit for bit."""
+        """Copies of the complete state, one row per environment; `restore` continues bit for bit."""
         saved = {name: values.copy() for name, values in self._memory().items()}
         for scene, world in zip(self._scenes, self.worlds, strict=True):
             saved |= {f"scene/{scene}/{name}": values for name, values in world.snapshot().items()}
         return saved
 
     def restore(self, saved: Mapping[str, Array]) -> None:
-        """Inverse of `snapshot`, into a simulation of the same robot, recipe, environments and scenes; other entries
-        are ignored."""
+        """Inverse of `snapshot`, for the same robot, recipe, environments and scenes; other entries are ignored."""
         self.hold(_under("simulation/fixed/", saved))
         for name, values in self._memory().items():
             if name not in saved or saved[name].shape != values.shape:

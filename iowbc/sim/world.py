@@ -66,8 +66,7 @@ class World:
         bodies, thing = np.arange(self.model.nbody), [] if self.layout.object is None else [self.layout.object]
         self._touched = np.concatenate([bodies[self.layout.feet], bodies[self.layout.hands], bodies[thing]])
         self._torque, self._external = self._last_torque.copy(), self._last_external[:, self._touched]
-        """Torques of the motors, torques and forces on `FEET`, `HANDS` and `THING` from what they touch, in the last
-        physics step."""
+        """Torques of the motors; contact torques and forces on `FEET`, `HANDS`, `THING`, in the last physics step."""
         self._body_position, self._body_quaternion, self._body_rotation = bind("xpos"), bind("xquat"), bind("xmat")
         self._inertia = bind("M")
         kept, count, history = timing.kept_targets, len(rows), bind("history")
@@ -232,8 +231,7 @@ class World:
         self._keep(ids)
 
     def release(self, state: SimulationState, slip_force: Array) -> None:
-        """Releases hands whose grip carried more than its slip force, (all environments,) [N], at any physics step of
-        the period."""
+        """Releases hands whose grip carried more than `slip_force`, (all environments,) [N], in any physics step."""
         if self.scene.kind == "free":
             return
         load = np.vecdot(self._past_forces, self._past_forces).max(axis=2)
@@ -339,8 +337,7 @@ class World:
 def make_world(
     robot: Robot, physics: Physics, scene: Scene, rows: Indices, timing: Timing, drake: Drake | None
 ) -> World:
-    """The environments of a scene, stepped by Drake if its settings are given, else by MuJoCo. Raises UsageError if
-    Drake, an extra, is not installed."""
+    """The environments of a scene, stepped by MuJoCo, or by Drake with its settings; UsageError if Drake is missing."""
     if drake is None:
         return World(robot, physics, scene, rows, timing)
     try:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from iowbc.arrays import Array, Indices, as_slice
 from iowbc.control import gait
 from iowbc.control.action import action_scale
-from iowbc.control.command import HEIGHT, OFFSET, VELOCITY
+from iowbc.control.command import HEIGHT, OFFSET, VELOCITY, YAW_RATE
 from iowbc.control.layout import EVERY
 from iowbc.control.observation import PolicyInputs
 from iowbc.recipe.simulation.holding import FREE
@@ -89,7 +89,12 @@ class Batch:
             self.buffers[name][:] = 0
         self._observe(moved)
         recorder.write_signals(
-            self.buffers, self.simulation.state, moved, self.memory, Ending.none(self.n), self.period
+            self.buffers,
+            self.simulation.state,
+            moved,
+            self.memory,
+            Ending(*np.zeros((5, self.n), np.bool_)),
+            self.period,
         )
 
     def reseed(self, seeds: NDArray[np.uint64]) -> None:
@@ -113,7 +118,7 @@ class Batch:
             simulation.planned_impulse[:] = self._pulls.force(memory.steps, memory.heading_reference)
         simulation.step()
         memory.steps += 1
-        self.guidance.turn(memory)
+        memory.heading_reference += memory.command[:, YAW_RATE] * self.period
         judgement = self.judge.judge(
             simulation.state,
             memory,
@@ -162,8 +167,7 @@ class Batch:
         self._observe(self.begin(which), which)
 
     def begin(self, which: Indices) -> Motion:
-        """Starts new episodes in some environments, (k,): commands, references, robot and object. Returns the motion of
-        all."""
+        """Starts new episodes in some environments, (k,). Returns the motion of all."""
         memory = self.memory
         key = self._schedule.start(which)
         joints, pitch = self.guidance.start(which, memory, key)

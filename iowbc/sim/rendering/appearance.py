@@ -95,9 +95,8 @@ def _origin(joint: ElementTree.Element) -> Any:
 
 def _replace_by_meshes(spec: Any, robot: Robot, meshes: list[Mesh]) -> None:
     """Draws the meshes, and hides the robot's primitive shapes in a group that is not drawn."""
-    bodies = set(robot.tree.bodies)
     for geom in spec.geoms:
-        if geom.parent.name in bodies:
+        if geom.parent.name in robot.tree.bodies:
             geom.group = 4
     for mesh in meshes:
         spec.add_mesh(name=mesh.link, file=str(mesh.file))

@@ -31,8 +31,7 @@ def private_buffers(fields: Fields, rows: int) -> Buffers:
 
 
 def create_shared(fields: Fields, rows: int) -> tuple[int, Buffers]:
-    """Shared buffers and the file descriptor that a worker inherits. The memory has no name in the file system and is
-    freed with its last holder."""
+    """Shared buffers and the file descriptor that a worker inherits. The memory is freed with its last holder."""
     descriptor = os.memfd_create("iowbc-buffers", os.MFD_CLOEXEC)
     os.ftruncate(descriptor, _place(fields, rows)[1])
     return descriptor, attach_shared(descriptor, fields, rows)

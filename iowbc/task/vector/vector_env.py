@@ -122,8 +122,7 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
         return buffers["observation"].copy(), buffers["reward"].copy(), done, infos
 
     def roll(self, rollout_policy: RolloutPolicy, steps: int) -> Trajectories:
-        """Runs a rollout of some control steps in the workers, with one message to each and one back. The result does
-        not depend on the number of workers."""
+        """Runs a rollout of some control steps, with one message to each worker; the same whatever their number."""
         messages = [Message(roll, (rollout_policy.part(*group), steps)) for group in self.workers.groups]
         return side_by_side(self._call(messages))
 
