@@ -33,8 +33,6 @@ class ModelIndex:
         """Body of the object."""
         self.object_position = None if self.object is None else slice(7 + count, model.nq)
         """Object in qpos: a pose, or x, y and yaw of a crate."""
-        self.object_velocity = None if self.object is None else slice(6 + count, model.nv)
-        """Object in qvel."""
         self.base, self.torso = bodies[robot.base], bodies[robot.torso]
         self.feet = _places(bodies, robot.sole_bodies)
         """Bodies of the feet, (2,)."""
@@ -53,28 +51,12 @@ class ModelIndex:
         """Contact points of the feet."""
         self.palms = _pair(geoms, "left_palm", "right_palm")
         """Geoms of the palms, (2,)."""
-        self.momentum = np.array([model.M_rowadr[3 : 6 + count] + axis for axis in range(3)])
-        """Entries of the inertia matrix that couple the base's translation to the robot's other speeds, (3, speeds)."""
-        self.momentum_speeds = slice(3, 6 + count)
-        """The velocities of `momentum` in qvel."""
-        self.past_forces = slice(0, 0) if self.object is None else _past_forces(model, HANDS)
-        """Entries of each hand in MuJoCo's history: two counters, then times and forces of a control period."""
-        self.past_ground = _past_forces(model, robot.sole_bodies)
-        """The same for the ground's force on each foot."""
-        self.past_targets = slice(0, int(np.sum(2 + 2 * model.actuator_history[:, 0])))
-        """Entries of each motor, the first in MuJoCo's history: two counters, times, past targets."""
         self.object_geom: int | None = geoms.get("object")
         """Geom with which the object touches palms."""
 
 
 def _places(indices: dict[str, int], names: Iterable[str]) -> slice | Indices:
     return as_slice(np.array([indices[name] for name in names]))
-
-
-def _past_forces(model: Any, names: tuple[str, str]) -> slice:
-    first = model.sensor(names[0]).id
-    start = int(model.sensor_historyadr[first])
-    return slice(start, start + 2 * (2 + 4 * int(model.sensor_history[first, 0])))
 
 
 def _pair(indices: dict[str, int], left: str, right: str) -> Indices | None:

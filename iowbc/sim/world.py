@@ -1,6 +1,7 @@
 """The environments of one scene: a model, and a batch of simulations of it stepped in one call."""
 
 from collections.abc import Mapping
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -18,6 +19,7 @@ from iowbc.sim.grip import Grip, Squeeze
 from iowbc.sim.model import compile_scene, require_stable
 from iowbc.sim.model_fields import ModelFields
 from iowbc.sim.model_index import BASE_ANGULAR, BASE_LINEAR, ModelIndex
+from iowbc.sim.objects import HANDS as HAND_BODIES
 from iowbc.sim.rolling import Rolling
 from iowbc.sim.shapes import measured
 from iowbc.sim.soles import Soles
@@ -69,13 +71,17 @@ class World:
         """Torques of the motors; contact torques and forces on `FEET`, `HANDS`, `THING`, in the last physics step."""
         self._body_position, self._body_quaternion, self._body_rotation = bind("xpos"), bind("xquat"), bind("xmat")
         self._inertia = bind("M")
-        kept, count, history = timing.kept_targets, len(rows), bind("history")
-        targets = history[:, self.layout.past_targets].reshape(count, -1, 2 + 2 * kept)
+        self._momentum_speeds = slice(3, self.layout.joint_speeds.stop)
+        self._momentum = self.model.M_rowadr[self._momentum_speeds] + np.arange(3)[:, None]
+        """Entries of the inertia matrix that couple the base's translation to the robot's other speeds, (3, speeds)."""
+        kept, history = timing.kept_targets, bind("history")
+        targets = history[:, : self.model.nu * (2 + 2 * kept)].reshape(len(rows), -1, 2 + 2 * kept)
         self._past_targets = targets[..., 2 + kept :]
-        past_ground = _past(history, self.layout.past_ground, timing.substeps)
+        """The history begins with two counters, times and targets of each motor."""
+        past_ground = _past_forces(self.model, history, robot.sole_bodies)
         self.soles = Soles(robot, self.batch, self.layout, self._external[:, FEET], past_ground, physics.contact_force)
         if self.layout.object is not None:
-            self._past_forces = _past(history, self.layout.past_forces, timing.substeps)
+            self._past_forces = _past_forces(self.model, history, HAND_BODIES)
         self._spatial_velocity, self._subtree_com, self._sites = bind("cvel"), bind("subtree_com"), bind("site_xpos")
         self._centres = bind("xipos")
         self._squeeze, self._grip = self._grasp(scene)
@@ -280,8 +286,8 @@ class World:
 
     def _robot_velocity(self) -> Array:
         """Velocity of the robot's centre of mass, (n, 3) [m/s]: momentum, in the first rows of M qvel, by mass."""
-        momentum = self._inertia.take(self.layout.momentum, axis=1)
-        momentum *= self.qvel[:, None, self.layout.momentum_speeds]
+        momentum = self._inertia.take(self._momentum, axis=1)
+        momentum *= self.qvel[:, None, self._momentum_speeds]
         velocity = momentum.sum(axis=2)
         velocity /= self.robot_mass[:, None]
         velocity += self.qvel[:, BASE_LINEAR]
@@ -349,7 +355,10 @@ def make_world(
     return DrakeWorld(robot, physics, scene, rows, timing, drake)
 
 
-def _past(history: Array, place: slice, substeps: int) -> Array:
-    """Forces of a pair of sensors in the physics steps of the last control period, (n, 2, substeps, 3) [N]."""
-    kept = history[:, place].reshape(len(history), 2, -1)
+def _past_forces(model: Any, history: Array, names: tuple[str, str]) -> Array:
+    """Forces of a pair of sensors in the physics steps of the last control period, (n, 2, substeps, 3) [N]. The history
+    of each holds two counters, times and forces."""
+    first = model.sensor(names[0]).id
+    start, substeps = int(model.sensor_historyadr[first]), int(model.sensor_history[first, 0])
+    kept = history[:, start : start + 2 * (2 + 4 * substeps)].reshape(len(history), 2, -1)
     return kept[..., 2 + substeps :].reshape(len(history), 2, substeps, 3)
