@@ -78,10 +78,10 @@ class World:
         targets = history[:, : self.model.nu * (2 + 2 * kept)].reshape(len(rows), -1, 2 + 2 * kept)
         self._past_targets = targets[..., 2 + kept :]
         """The history begins with two counters, times and targets of each motor."""
-        past_ground = _past_forces(self.model, history, robot.sole_bodies)
+        past_ground = _force_history(self.model, history, robot.sole_bodies)
         self.soles = Soles(robot, self.batch, self.layout, self._external[:, FEET], past_ground, physics.contact_force)
         if self.layout.object is not None:
-            self._past_forces = _past_forces(self.model, history, HAND_BODIES)
+            self._past_forces = _force_history(self.model, history, HAND_BODIES)
         self._spatial_velocity, self._subtree_com, self._sites = bind("cvel"), bind("subtree_com"), bind("site_xpos")
         self._centres = bind("xipos")
         self._squeeze, self._grip = self._grasp(scene)
@@ -355,7 +355,7 @@ def make_world(
     return DrakeWorld(robot, physics, scene, rows, timing, drake)
 
 
-def _past_forces(model: Any, history: Array, names: tuple[str, str]) -> Array:
+def _force_history(model: Any, history: Array, names: tuple[str, str]) -> Array:
     """Forces of a pair of sensors in the physics steps of the last control period, (n, 2, substeps, 3) [N]. The history
     of each holds two counters, times and forces."""
     first = model.sensor(names[0]).id
