@@ -1,7 +1,6 @@
 """The weighted sum of the terms, with its parts."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from operator import attrgetter
 
 import numpy as np
@@ -15,23 +14,22 @@ CONTRACT = "it takes a Step (iowbc/task/rewards/table.py) and returns a finite n
 """Contract of a user-defined term."""
 
 
-@dataclass(frozen=True)
 class WeightedTerm:
     """A term with its weight and kernel width."""
 
-    column: int
-    """Its index among all terms."""
-    function: Term
-    weight: float
-    """Reward per control step for the value 1."""
-    width: float | None
-    """Width of its kernel; None without a kernel."""
+    def __init__(self, column: int, function: Term, setting: float | Kernel | CustomTerm, seconds: float) -> None:
+        """`column`: index among all terms; `setting`: weight, per second or per event, in the recipe; `seconds`: time
+        for which it is given in a control step."""
+        self.column, self._function = column, function
+        weight, self._width = (setting, None) if isinstance(setting, float | int) else (setting.weight, setting.width)
+        self.weight = weight * seconds
+        """Reward per control step for the value 1."""
 
     def value(self, step: Step) -> Array:
         """Value before weighting, (n,)."""
-        value: Array = np.asarray(self.function(step))
-        if self.width is not None:
-            value = kernel(value, self.width)
+        value: Array = np.asarray(self._function(step))
+        if self._width is not None:
+            value = kernel(value, self._width)
         return value if value.ndim == 1 else value.sum(axis=1)
 
 
@@ -52,7 +50,7 @@ class RewardFunction:
         settings = {path: attrgetter(path)(recipe) for path in TERMS}
         settings |= {f"own.{name}": term for name, term in recipe.own_terms.items()}
         weighted = {
-            path: _weighted(column, function, settings[path], seconds.get(path, period))
+            path: WeightedTerm(column, function, settings[path], seconds.get(path, period))
             for column, (path, function) in enumerate(functions.items())
         }
         self._terms = [term for path, term in weighted.items() if term.weight != 0.0 or path in TRACKED]
@@ -83,12 +81,6 @@ class RewardFunction:
             weights = weights + part[:, None] * self._change
         terms *= weights
         return terms, tracking
-
-
-def _weighted(column: int, function: Term, setting: float | Kernel | CustomTerm, seconds: float) -> WeightedTerm:
-    if isinstance(setting, Kernel | CustomTerm):
-        return WeightedTerm(column, function, setting.weight * seconds, setting.width)
-    return WeightedTerm(column, function, setting * seconds, None)
 
 
 def kernel(squared_error: Array, width: float | Array) -> Array:
