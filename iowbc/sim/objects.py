@@ -71,13 +71,13 @@ def _add_hands(spec: Any, robot: Robot, timing: Timing) -> None:
         inertial = {"mass": NEGLIGIBLE_MASS, "inertia": [NEGLIGIBLE_MASS] * 3}
         hand = spec.body(wrist).add_body(name=name, pos=place, explicitinertial=True, **inertial)
         hand.add_site(name=name, group=4)
-        spec.add_sensor(
-            name=name,
-            type=mujoco.mjtSensor.mjSENS_FORCE,
-            objtype=mujoco.mjtObj.mjOBJ_SITE,
-            objname=name,
-            nsample=timing.substeps,
-        )
+        add_force_sensor(spec, name, name, timing.substeps)
+
+
+def add_force_sensor(spec: Any, name: str, site: str, kept: int = 0) -> None:
+    """A sensor of the force that passes through the body of a site; it keeps the values of `kept` physics steps."""
+    force, of_site = mujoco.mjtSensor.mjSENS_FORCE, mujoco.mjtObj.mjOBJ_SITE
+    spec.add_sensor(name=name, type=force, objtype=of_site, objname=site, nsample=kept)
 
 
 def _add_grips(spec: Any, body: Any, scene: Scene) -> None:
