@@ -54,8 +54,7 @@ class Drives:
 
 
 def drawn_effort(robot: Robot, strength: Array, linkage_effort: Array) -> Array:
-    """Torque limits of motors and linkages at low speed, (n, joints) [N·m], from the drawn strengths (n, joints) and
-    the nominal limits of the linkages (n, linkages) [N·m]."""
+    """Torque limits at low speed, (n, joints) [N·m]; drawn strengths (n, joints), limits of linkages (n, linkages)."""
     effort, pairs = robot.effort * strength, robot.linkages
     effort[:, pairs] = (linkage_effort * strength[:, pairs].mean(axis=2))[..., None]
     return effort

@@ -57,6 +57,11 @@ class DrawTable:
         undrawn = chances[:, self.width :] >= self._probability
         return np.where(undrawn[:, self._owner], self.nominal, row)
 
+    def views(self, rows: Array) -> dict[str, Array]:
+        """The quantities in rows (n, width), by name, (n,) or (n, k)."""
+        places = self.columns.items()
+        return {name: rows[:, at.start] if at.stop - at.start == 1 else rows[:, at] for name, at in places}
+
 
 class Draws:
     """The quantities drawn for n environments, by name; arrays (n,) or (n, k)."""
@@ -81,15 +86,9 @@ class Draws:
         self._habit_rows = np.tile(self._behaviour_distributions.nominal, (n, 1))
         chances = np.array([share for _, share in recipe.partner.behaviours])
         self._behaviours = np.cumsum(chances)[:-1] / chances.sum()
-        self.values: dict[str, Array] = {name: np.ones(n) for name in SWITCHES}
-        self.values["partner_behaviour"] = np.zeros(n)
-        self.values |= {
-            name: self._habit_rows[:, place.start] for name, place in self._behaviour_distributions.columns.items()
-        }
-        for name, place in self._table.columns.items():
-            if name != PUSH_SHARE:
-                single = place.stop - place.start == 1
-                self.values[name] = self._rows[:, place.start] if single else self._rows[:, place]
+        self.values: dict[str, Array] = {name: np.ones(n) for name in SWITCHES} | {"partner_behaviour": np.zeros(n)}
+        self.values |= self._behaviour_distributions.views(self._habit_rows) | self._table.views(self._rows)
+        del self.values[PUSH_SHARE]
         first = self._table.columns["object_com_offset"].start
         self.values |= {name: self._rows[:, first + place] for place, name in enumerate(BY_AXIS)}
         self.values["object_mass"] = self._nominal_mass.copy()

@@ -52,9 +52,6 @@ class Grip:
         size = (stiffness * self.angle + damping * rate).clip(-most, most)
         return axis * -size[:, None]
 
-    def arrays(self) -> dict[str, Array]:
-        return {"grip_angle": self.angle, "grip_rate": self.rate}
-
 
 class Squeeze:
     """Adds offsets to the joint targets so that the motors press with a force f: τ = Jᵀ f, target += τ / kp."""

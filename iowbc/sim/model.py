@@ -8,7 +8,7 @@ import numpy as np
 from iowbc.recipe.simulation.scene import Scene
 from iowbc.recipe.simulation.simulation import Physics
 from iowbc.robot.description import Robot
-from iowbc.sim.objects import GROUND_BIT, OBJECT_BIT, add_object
+from iowbc.sim.objects import GROUND_BIT, OBJECT_BIT, add_force_sensor, add_object
 from iowbc.sim.timing import Timing
 
 GROUND = "ground"
@@ -70,12 +70,7 @@ def scene_spec(robot: Robot, physics: Physics, scene: Scene, timing: Timing, *, 
     if scene.object is not None:
         touched = physics.body_contact != "nothing"
         add_object(spec, robot, scene, scene.object, timing, touched=touched, dressed=dressed)
-    spec.add_sensor(
-        name="contact_forces",
-        type=mujoco.mjtSensor.mjSENS_FORCE,
-        objtype=mujoco.mjtObj.mjOBJ_SITE,
-        objname=robot.soles[0],
-    )
+    add_force_sensor(spec, "contact_forces", robot.soles[0])
     return spec
 
 

@@ -96,10 +96,6 @@ class ModelFields:
         self._fields["geom_rbound"][ids, geom] = np.sqrt(np.sum(half * half, axis=1))
         self._fields["geom_aabb"][ids, geom, 3:] = half
 
-    def half_size(self, ids: Indices) -> Array:
-        """Half extents of the object, (k, 3) [m]."""
-        return self._fields["geom_size"][ids, self._layout.object_geom]
-
     def snapshot(self) -> dict[str, Array]:
         """Copies of all fields that may differ."""
         return {name: field.copy() for name, field in self._fields.items()}

@@ -1,6 +1,6 @@
 """Adds a scene's object to a model: one between the hands, or a crate on wheels."""
 
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import Any
 
 import mujoco
@@ -43,18 +43,17 @@ def add_object(
     by_contact = scene.kind == "push" or scene.grasp.kind == "contact"
     ground_bit = GROUND_BIT if scene.kind == "lift" else 0
     bits = {"contype": OBJECT_BIT if by_contact or touched else 0, "conaffinity": ground_bit}
+    look = {"name": "object", "group": 2, "rgba": PAINTED, **bits}
     if thing.shape == "tyre":
         _add_ring(body, thing, bits)
     elif thing.shape == "box":
         colour = WOOD if scene.kind == "push" else CARDBOARD
-        body.add_geom(name="object", type=mujoco.mjtGeom.mjGEOM_BOX, size=shape.high, group=2, rgba=colour, **bits)
+        body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=shape.high, **look | {"rgba": colour})
     elif thing.shape == "cylinder":
-        sizes = [shape.high[0], shape.high[2], 0.0]
-        body.add_geom(name="object", type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=sizes, group=2, rgba=PAINTED, **bits)
+        body.add_geom(type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=[shape.high[0], shape.high[2], 0.0], **look)
     else:
         spec.add_mesh(name="object", uservert=shape.vertices.ravel(), userface=shape.faces.ravel(), inertia=HULL)
-        kind = mujoco.mjtGeom.mjGEOM_MESH
-        body.add_geom(name="object", type=kind, meshname="object", group=2, rgba=PAINTED, **bits)
+        body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname="object", **look)
     if scene.kind == "push":
         _add_wheels(spec, body, thing, dressed)
     else:
@@ -72,13 +71,13 @@ def _add_hands(spec: Any, robot: Robot, timing: Timing) -> None:
         inertial = {"mass": NEGLIGIBLE_MASS, "inertia": [NEGLIGIBLE_MASS] * 3}
         hand = spec.body(wrist).add_body(name=name, pos=place, explicitinertial=True, **inertial)
         hand.add_site(name=name, group=4)
-        spec.add_sensor(
-            name=name,
-            type=mujoco.mjtSensor.mjSENS_FORCE,
-            objtype=mujoco.mjtObj.mjOBJ_SITE,
-            objname=name,
-            nsample=timing.substeps,
-        )
+        add_force_sensor(spec, name, name, timing.substeps)
+
+
+def add_force_sensor(spec: Any, name: str, site: str, kept: int = 0) -> None:
+    """A sensor of the force that passes through the body of a site; it keeps the values of `kept` physics steps."""
+    force, of_site = mujoco.mjtSensor.mjSENS_FORCE, mujoco.mjtObj.mjOBJ_SITE
+    spec.add_sensor(name=name, type=force, objtype=of_site, objname=site, nsample=kept)
 
 
 def _add_grips(spec: Any, body: Any, scene: Scene) -> None:
@@ -127,17 +126,16 @@ def _add_wheels(spec: Any, body: Any, thing: Object, dressed: bool) -> None:
         return
     (x, y), z = measured(thing).high[:2], -measured(thing).low[2]
     corner = 0.85 if thing.shape == "box" else 0.6
-    for along in (-corner, corner):
-        for across in (-corner, corner):
-            body.add_geom(
-                type=mujoco.mjtGeom.mjGEOM_SPHERE,
-                size=[0.5 * CLEARANCE, 0.0, 0.0],
-                pos=[along * x, across * y, -z - 0.5 * CLEARANCE],
-                contype=0,
-                conaffinity=0,
-                rgba=RUBBER,
-                group=2,
-            )
+    for along, across in product((-corner, corner), repeat=2):
+        body.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_SPHERE,
+            size=[0.5 * CLEARANCE, 0.0, 0.0],
+            pos=[along * x, across * y, -z - 0.5 * CLEARANCE],
+            contype=0,
+            conaffinity=0,
+            rgba=RUBBER,
+            group=2,
+        )
 
 
 def _add_ring(body: Any, thing: Object, bits: dict[str, int]) -> None:

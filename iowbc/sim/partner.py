@@ -59,8 +59,7 @@ class Partner:
         """Partners with a feed of their own: velocity of the handle in the frame of the heading at the start, yaw rate
         of the object, and height of the handle from any origin; from the next reset on, (n,). Not part of snapshots."""
         self.loose = np.zeros(n, np.bool_)
-        """Steered partners that exert no horizontal force: they bear their share and follow the handle, (n,). Not part
-        of snapshots."""
+        """Steered partners without horizontal force: they bear their share and follow, (n,). Not in snapshots."""
         self._turning_inertia = np.array([measured(thing).about_axes[2] if thing else 0.0 for thing in things])
         self._yaw_stiffness, self._yaw_damping, self._yaw_lead = np.zeros(n), np.zeros(n), np.zeros(n)
         self._present, self._height = np.zeros(n), np.full(n, np.nan)
@@ -78,7 +77,7 @@ class Partner:
         self._turn_rate, self._own_way = np.zeros(n), np.zeros((n, 2))
         self._keep = float(np.exp(-period / recipe.noise_time))
         self._keep_share = float(np.exp(-period / recipe.drift_time))
-        self._derive()
+        self.derive()
 
     def reset(self, which: Indices, drawn: dict[str, Array], state: SimulationState) -> None:
         """New partners for some environments, at rest at the handle."""
@@ -121,7 +120,7 @@ class Partner:
         away *= ~steered[:, None]
         self._offset[which, 0] = forward[:, 0] * away[:, 0] + forward[:, 1] * away[:, 1]
         self._offset[which, 1] = forward[:, 0] * away[:, 1] - forward[:, 1] * away[:, 0]
-        self._derive()
+        self.derive()
 
     def _behave(self, which: Indices, drawn: dict[str, Array]) -> None:
         behaviour, delay = drawn["partner_behaviour"][which], drawn["partner_delay"][which]
@@ -138,8 +137,8 @@ class Partner:
         self._damping[which] *= np.where(lags, self._recipe.lagging.damping, 1.0)
         self._line.set_latency(which, np.where(lags, self._recipe.lagging.delay, delay) / self._period)
 
-    def _derive(self) -> None:
-        """Recomputes values derived from the drawn shares and behaviours."""
+    def derive(self) -> None:
+        """Recomputes values derived from the drawn shares and behaviours, also after `arrays` were overwritten."""
         self._any, self._steers = bool(self._present.any()), bool(self.steered.any())
         there = self._present > 0.0
         self._which = [np.flatnonzero(there & (self._behaviour == kind)) for kind in range(len(BEHAVIOURS))]
@@ -318,10 +317,6 @@ class Partner:
     def arrays(self) -> dict[str, Array]:
         own = {name: getattr(self, f"_{name}") for name in STATE_FIELDS}
         return own | {f"line/{name}": values for name, values in self._line.arrays().items()}
-
-    def restored(self) -> None:
-        """Must be called after the arrays were overwritten."""
-        self._derive()
 
 
 def _length(vectors: Array) -> Array:

@@ -25,9 +25,10 @@ class Rolling:
     """Wheels of n crates."""
 
     def __init__(self, batch: Any, layout: ModelIndex, fields: ModelFields, scene: Scene) -> None:
-        if layout.object is None or layout.object_velocity is None:
+        if layout.object is None:
             raise ValueError("a crate is needed to roll")
-        self._thing, self._speeds, self._rolling = layout.object, layout.object_velocity, fields.rolling
+        self._thing, self._rolling = layout.object, fields.rolling
+        self._speeds = slice(layout.joint_speeds.stop, None)
         self._arm, self._slow = scene.yaw_arm, scene.creep
         self._velocity, self._external = batch.bind("qvel"), batch.bind("cfrc_ext")
         self._place, self._centre = batch.bind("xpos"), batch.bind("xipos")

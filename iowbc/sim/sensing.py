@@ -9,16 +9,6 @@ from iowbc.robot import rotations
 from iowbc.sim.delay import DelayLine
 from iowbc.sim.state import SimulationState
 
-SIZES = {
-    "base_angular_velocity": 3,
-    "projected_gravity": 3,
-    "heading": 1,
-    "object_position": 3,
-    "object_quaternion": 4,
-    "object_linear_velocity": 3,
-    "object_angular_velocity": 3,
-}
-"""Columns of the quantities of `Measured` that follow those of the joints in a row."""
 OBJECT_WIDTH = 13
 NOT_SEEN = np.eye(1, OBJECT_WIDTH, 3)[0]
 """Measurement without an object: identity, at rest at the base."""
@@ -32,9 +22,10 @@ class Sensing:
 
     def __init__(self, recipe: Recipe, joints: int, has_object: Mask, longest_latency: int, period: float) -> None:
         n, self._period = len(has_object), period
-        sizes = {"joint_position": joints, "joint_velocity": joints, **SIZES}
-        ends = np.cumsum([*sizes.values()]).tolist()
-        columns = {name: slice(end - size, end) for (name, size), end in zip(sizes.items(), ends, strict=True)}
+        quantities = _quantities(recipe, joints)
+        sizes, deviations = zip(*quantities.values(), strict=True)
+        ends = np.cumsum(sizes).tolist()
+        columns = {name: slice(end - size, end) for name, size, end in zip(quantities, sizes, ends, strict=True)}
         self.noise_width = ends[-1]
         """Noise columns that sensing uses per step."""
         self._width = width = columns["heading"].stop
@@ -51,8 +42,7 @@ class Sensing:
         self._mounting, self._gyro_bias = np.tile(np.eye(3), (n, 1, 1)), np.zeros((n, 3))
         self._drift, self._drifted = np.zeros(n), np.zeros(n)
         self._deviation = np.zeros((n, self.noise_width))
-        deviations = _deviations(recipe)
-        self._nominal = np.repeat([deviations[name] for name in sizes], [*sizes.values()])
+        self._nominal = np.repeat(deviations, sizes)
         self.rows = np.zeros((n, self.noise_width))
         self._quaternion = self.rows[:, columns["object_quaternion"]]
         self.measured = Measured(**{name: self.rows[:, place] for name, place in columns.items()})
@@ -128,16 +118,17 @@ class Sensing:
         return own
 
 
-def _deviations(recipe: Recipe) -> dict[str, float]:
-    """Standard deviation of each quantity; a rotation by η changes a unit quaternion by η / 2."""
+def _quantities(recipe: Recipe, joints: int) -> dict[str, tuple[int, float]]:
+    """Quantities of `Measured` in the order of a row: number of columns and standard deviation of the noise. A rotation
+    by η changes a unit quaternion by η / 2."""
     return {
-        "joint_position": recipe.joint_position,
-        "joint_velocity": recipe.joint_velocity,
-        "base_angular_velocity": recipe.angular_velocity,
-        "projected_gravity": recipe.gravity,
-        "heading": recipe.heading,
-        "object_position": recipe.object_position,
-        "object_quaternion": 0.5 * recipe.object_orientation,
-        "object_linear_velocity": recipe.object_velocity,
-        "object_angular_velocity": recipe.object_angular_velocity,
+        "joint_position": (joints, recipe.joint_position),
+        "joint_velocity": (joints, recipe.joint_velocity),
+        "base_angular_velocity": (3, recipe.angular_velocity),
+        "projected_gravity": (3, recipe.gravity),
+        "heading": (1, recipe.heading),
+        "object_position": (3, recipe.object_position),
+        "object_quaternion": (4, 0.5 * recipe.object_orientation),
+        "object_linear_velocity": (3, recipe.object_velocity),
+        "object_angular_velocity": (3, recipe.object_angular_velocity),
     }

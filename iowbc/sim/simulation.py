@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from iowbc import counter_random as random
 from iowbc.arrays import Array, Indices, Keys
+from iowbc.control.layout import EVERY
 from iowbc.recipe.evaluation.evaluation import Drake
 from iowbc.recipe.simulation.simulation import SimulationSettings as Recipe
 from iowbc.robot import rotations
@@ -21,7 +22,7 @@ from iowbc.sim.episode_draws import Draws
 from iowbc.sim.sensing import Sensing
 from iowbc.sim.state import Period, SimulationState
 from iowbc.sim.timing import Timing
-from iowbc.sim.world import EVERY, World, make_world
+from iowbc.sim.world import World, make_world
 
 STARTS_AT_ZERO = (
     *("joint_acceleration", "slipped", "partner_force", "partner_velocity", "partner_energy", "partner_share"),
@@ -57,17 +58,16 @@ class Simulation:
         self.envs = np.asarray(envs, np.int64)
         self.n = n = len(self.envs)
         self.period = 1.0 / control_frequency
-        self.scene_names = tuple(scenes)
         self.fixed: dict[str, Array] = {}
-        models = [_scene(recipe, name) for name in self.scene_names]
+        models = [_scene(recipe, name) for name in scenes]
         if len(models) != n:
             raise ValueError(f"{n} environments but {len(models)} scenes")
         timing = Timing(self.period, recipe.physics.timestep, recipe.randomization.longest_latency)
-        self._scenes = tuple(dict.fromkeys(self.scene_names))
-        rows = [np.flatnonzero(np.array(self.scene_names) == name) for name in self._scenes]
+        by_name = dict(zip(scenes, models, strict=True))
+        self._scenes = tuple(by_name)
         self.worlds = tuple(
-            make_world(robot, recipe.physics, _scene(recipe, name), own, timing, drake)
-            for name, own in zip(self._scenes, rows, strict=True)
+            make_world(robot, recipe.physics, model, np.flatnonzero(np.array(scenes) == name), timing, drake)
+            for name, model in by_name.items()
         )
         self._owner, self._index = np.empty(n, np.int64), np.empty(n, np.int64)
         """World of each environment, and its place there, (n,)."""
@@ -81,7 +81,7 @@ class Simulation:
         self._episode_key = self._key.copy()
         self.episode = np.zeros(n, np.int64)
         self.clock = np.zeros(n, np.int64)
-        self.state = SimulationState.empty(n, len(robot.joints))
+        self.state = SimulationState(n, len(robot.joints))
         self.state.has_object[:] = [model.object is not None for model in models]
         self.target = np.tile(robot.default_position, (n, 1))
         self.feed = np.zeros((n, partner.FEED))
@@ -134,8 +134,7 @@ class Simulation:
         return gathered
 
     def hold(self, fixed: Mapping[str, Array], which: Indices | slice = EVERY) -> None:
-        """Holds quantities of some environments at values (k,) from the next reset on; NaN draws. Other held quantities
-        stay held."""
+        """Holds quantities of some environments at values (k,) from the next reset on; NaN draws, others stay."""
         unknown = [name for name in fixed if name not in self.drawn]
         if unknown:
             raise KeyError(f"no randomised quantities {unknown}; there are: {', '.join(sorted(self.drawn))}")
@@ -233,8 +232,7 @@ class Simulation:
         self._deliver()
 
     def _handover_force(self, wrench: Array) -> None:
-        """Supports the robot's share of a held object's weight between the hands, fading out over T: f = (1 - share) m
-        g (1 - t / T)."""
+        """Bears the robot's share of a held object between the hands, fading out: f = (1 - share) m g (1 - t / T)."""
         if (self.clock < self._handover).any():
             left = np.maximum(self._handover - self.clock, 0.0) / np.maximum(self._handover, 1.0)
             drawn, lifted = self.drawn, np.zeros((self.n, 3))
@@ -283,16 +281,14 @@ class Simulation:
         return delayed | {f"simulation/{name}": values for name, values in own.items()}
 
     def snapshot(self) -> dict[str, Array]:
-        """Copies of the complete state, one row per environment, whatever processes they are spread over; `restore`
-        continues bit for bit."""
+        """Copies of the complete state, one row per environment; `restore` continues bit for bit."""
         saved = {name: values.copy() for name, values in self._memory().items()}
         for scene, world in zip(self._scenes, self.worlds, strict=True):
             saved |= {f"scene/{scene}/{name}": values for name, values in world.snapshot().items()}
         return saved
 
     def restore(self, saved: Mapping[str, Array]) -> None:
-        """Inverse of `snapshot`, into a simulation of the same robot, recipe, environments and scenes; other entries
-        are ignored."""
+        """Inverse of `snapshot`, for the same robot, recipe, environments and scenes; other entries are ignored."""
         self.hold(_under("simulation/fixed/", saved))
         for name, values in self._memory().items():
             if name not in saved or saved[name].shape != values.shape:
@@ -301,7 +297,7 @@ class Simulation:
             values[...] = saved[name]
         for scene, world in zip(self._scenes, self.worlds, strict=True):
             world.restore(_under(f"scene/{scene}/", saved))
-        self.partner.restored()
+        self.partner.derive()
 
     def world_of(self, env: int) -> tuple[World, int]:
         """The world of an environment, and its index there."""

@@ -37,8 +37,7 @@ class Soles:
         }
 
     def _pressure(self) -> tuple[Array, Array]:
-        """Contact of each foot, (n, 2) bool, and its centre of pressure on the ground from the robot's centre of
-        mass, (n, 2, 3) [m]."""
+        """Contact of each foot, (n, 2), and its centre of pressure from the robot's centre of mass, (n, 2, 3) [m]."""
         torque, force = self._wrench[..., :3], self._wrench[..., 3:]
         loaded = force[..., 2] > self._lightest
         weight = np.where(loaded, force[..., 2], 1.0)

@@ -1,11 +1,11 @@
 """Inputs of the physics for a control period, and the true state after it, without sensor errors."""
 
-from dataclasses import dataclass, fields
-from typing import Any, Self
+from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
-from iowbc.arrays import Array, Indices, Mask
+from iowbc.arrays import Array, Indices
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,6 @@ class Period:
         return type(self)(**{name: values[place] for name, values in vars(self).items()})
 
 
-@dataclass(frozen=True)
 class SimulationState:
     """The true state after a control period, in arrays that are overwritten. World frame unless said otherwise;
     quaternions wxyz.
@@ -40,96 +39,74 @@ class SimulationState:
     Forces, torques, accelerations are those of the last physics step; all else is of the state that it led to.
     """
 
-    base_position: Array
-    """Pelvis, (n, 3) [m]."""
-    base_quaternion: Array
-    """(n, 4)."""
-    base_rotation: Array
-    """Rotation matrix of the base, (n, 3, 3)."""
-    base_linear_velocity: Array
-    """(n, 3) [m/s]."""
-    base_angular_velocity: Array
-    """Base frame, (n, 3) [rad/s]."""
-    joint_position: Array
-    """MJCF order, (n, joints) [rad]."""
-    joint_velocity: Array
-    """(n, joints) [rad/s]."""
-    joint_acceleration: Array
-    """Mean over the control period, (n, joints) [rad/s²]."""
-    joint_torque: Array
-    """Torque of the motors, (n, joints) [N·m]."""
-    torque_limit: Array
-    """Torque limits of the motors in that direction in this control period, (n, joints) [N·m]."""
-    saturation: Mask
-    """Motors at that limit, (n, joints)."""
-    torso_rotation: Array
-    """Rotation matrix of the torso, (n, 3, 3)."""
-    com_position: Array
-    """The robot's own centre of mass, (n, 3) [m]."""
-    system_velocity: Array
-    """v_sys: velocity of the common centre of mass of robot and object (held, or crate), (n, 3) [m/s]."""
-    foot_position: Array
-    """Sole centres, left and right, (n, 2, 3) [m]."""
-    foot_velocity: Array
-    """Velocity of the sole centres, (n, 2, 3) [m/s]."""
-    foot_force: Array
-    """Contact force on each foot, of the ground and of whatever else it touches, (n, 2, 3) [N]."""
-    foot_contact: Mask
-    """(n, 2)."""
-    has_object: Mask
-    """(n,)."""
-    object_position: Array
-    """Object's centre, (n, 3) [m]; zero without an object."""
-    object_quaternion: Array
-    """(n, 4); identity without an object."""
-    object_linear_velocity: Array
-    """Velocity of the object's centre, (n, 3) [m/s]."""
-    object_angular_velocity: Array
-    """(n, 3) [rad/s]."""
-    grasped: Mask
-    """Hands (left, right) that hold the object, or touch it where there is nothing to hold, (n, 2)."""
-    slipped: Mask
-    """Hands that let go in this control period, (n, 2)."""
-    grip_force: Array
-    """Force of the object on each hand, (n, 2, 3) [N]."""
-    hand_weight_share: Array
-    """Vertical force of the hands on a held object as a fraction of its weight, (n,); zero with nothing to hold."""
-    link_object_force: Array
-    """Size of the force of links other than the hands, or of the ground, on the object, (n,) [N]."""
-    partner_force: Array
-    """Force of the partner on the object, (n, 3) [N]."""
-    partner_velocity: Array
-    """Velocity that the partner intends for the handle, (n, 3) [m/s]; zero without a partner."""
-    handle_velocity: Array
-    """Velocity of the object's far handle, which a partner holds, (n, 3) [m/s]; zero without an object."""
-    partner_share: Array
-    """Share of the weight, or in a push of the rolling resistance, that the partner bears at the time, (n,)."""
-    partner_energy: Array
-    """Work of the partner on the object since the reset, (n,) [J]."""
-    external_force: Array
-    """Force and torque of partner and impulses on the object about its centre of mass, (n, 6) [N, N·m]."""
-    push_force: Array
-    """Force of pushes on the base, (n, 3) [N]."""
-    diverged: Mask
-    """Simulation diverged in this control period and is back in the state before it; to be reset, (n,)."""
-
-    @classmethod
-    def empty(cls, n: int, joints: int) -> Self:
+    def __init__(self, n: int, joints: int) -> None:
         """Arrays for n environments of a robot with so many joints, upright at the origin."""
-        mask: dict[str, tuple[int, ...]] = dict.fromkeys(("foot_contact", "grasped", "slipped"), (2,))
-        mask |= {"saturation": (joints,), "has_object": (), "diverged": ()}
-        of_joints = ("joint_position", "joint_velocity", "joint_acceleration", "joint_torque", "torque_limit")
-        of_sides = ("foot_position", "foot_velocity", "foot_force", "grip_force")
-        single = ("hand_weight_share", "link_object_force", "partner_energy", "partner_share")
-        real: dict[str, tuple[int, ...]] = dict.fromkeys(of_joints, (joints,)) | dict.fromkeys(of_sides, (2, 3))
-        real |= dict.fromkeys(single, ()) | dict.fromkeys(("base_quaternion", "object_quaternion"), (4,))
-        real |= dict.fromkeys(("base_rotation", "torso_rotation"), (3, 3)) | {"external_force": (6,)}
-        arrays: dict[str, Any] = {}
-        for field in fields(cls):
-            if field.name in mask:
-                arrays[field.name] = np.zeros((n, *mask[field.name]), bool)
-            else:
-                arrays[field.name] = np.zeros((n, *real.get(field.name, (3,))))
-            if field.name.endswith("quaternion"):
-                arrays[field.name][:, 0] = 1.0
-        return cls(**arrays)
+        self.base_position = np.zeros((n, 3))
+        """Pelvis, (n, 3) [m]."""
+        self.base_quaternion = np.tile([1.0, 0.0, 0.0, 0.0], (n, 1))
+        self.base_rotation = np.zeros((n, 3, 3))
+        """Rotation matrix of the base, (n, 3, 3)."""
+        self.base_linear_velocity = np.zeros((n, 3))
+        """(n, 3) [m/s]."""
+        self.base_angular_velocity = np.zeros((n, 3))
+        """Base frame, (n, 3) [rad/s]."""
+        self.joint_position = np.zeros((n, joints))
+        """MJCF order, (n, joints) [rad]."""
+        self.joint_velocity = np.zeros((n, joints))
+        """(n, joints) [rad/s]."""
+        self.joint_acceleration = np.zeros((n, joints))
+        """Mean over the control period, (n, joints) [rad/s²]."""
+        self.joint_torque = np.zeros((n, joints))
+        """Torque of the motors, (n, joints) [N·m]."""
+        self.torque_limit = np.zeros((n, joints))
+        """Torque limits of the motors in that direction in this control period, (n, joints) [N·m]."""
+        self.saturation = np.zeros((n, joints), np.bool_)
+        """Motors at that limit, (n, joints)."""
+        self.torso_rotation = np.zeros((n, 3, 3))
+        """Rotation matrix of the torso, (n, 3, 3)."""
+        self.com_position = np.zeros((n, 3))
+        """The robot's own centre of mass, (n, 3) [m]."""
+        self.system_velocity = np.zeros((n, 3))
+        """v_sys: velocity of the common centre of mass of robot and object (held, or crate), (n, 3) [m/s]."""
+        self.foot_position = np.zeros((n, 2, 3))
+        """Sole centres, left and right, (n, 2, 3) [m]."""
+        self.foot_velocity = np.zeros((n, 2, 3))
+        """Velocity of the sole centres, (n, 2, 3) [m/s]."""
+        self.foot_force = np.zeros((n, 2, 3))
+        """Contact force on each foot, of the ground and of whatever else it touches, (n, 2, 3) [N]."""
+        self.foot_contact = np.zeros((n, 2), np.bool_)
+        self.has_object = np.zeros(n, np.bool_)
+        self.object_position = np.zeros((n, 3))
+        """Object's centre, (n, 3) [m]; zero without an object."""
+        self.object_quaternion = np.tile([1.0, 0.0, 0.0, 0.0], (n, 1))
+        """(n, 4); identity without an object."""
+        self.object_linear_velocity = np.zeros((n, 3))
+        """Velocity of the object's centre, (n, 3) [m/s]."""
+        self.object_angular_velocity = np.zeros((n, 3))
+        """(n, 3) [rad/s]."""
+        self.grasped = np.zeros((n, 2), np.bool_)
+        """Hands (left, right) that hold the object, or touch it where there is nothing to hold, (n, 2)."""
+        self.slipped = np.zeros((n, 2), np.bool_)
+        """Hands that let go in this control period, (n, 2)."""
+        self.grip_force = np.zeros((n, 2, 3))
+        """Force of the object on each hand, (n, 2, 3) [N]."""
+        self.hand_weight_share = np.zeros(n)
+        """Vertical force of the hands on a held object as a fraction of its weight, (n,); zero with nothing to hold."""
+        self.link_object_force = np.zeros(n)
+        """Size of the force of links other than the hands, or of the ground, on the object, (n,) [N]."""
+        self.partner_force = np.zeros((n, 3))
+        """Force of the partner on the object, (n, 3) [N]."""
+        self.partner_velocity = np.zeros((n, 3))
+        """Velocity that the partner intends for the handle, (n, 3) [m/s]; zero without a partner."""
+        self.handle_velocity = np.zeros((n, 3))
+        """Velocity of the object's far handle, which a partner holds, (n, 3) [m/s]; zero without an object."""
+        self.partner_share = np.zeros(n)
+        """Share of the weight, or in a push of the rolling resistance, that the partner bears at the time, (n,)."""
+        self.partner_energy = np.zeros(n)
+        """Work of the partner on the object since the reset, (n,) [J]."""
+        self.external_force = np.zeros((n, 6))
+        """Force and torque of partner and impulses on the object about its centre of mass, (n, 6) [N, N·m]."""
+        self.push_force = np.zeros((n, 3))
+        """Force of pushes on the base, (n, 3) [N]."""
+        self.diverged = np.zeros(n, np.bool_)
+        """Simulation diverged in this control period and is back in the state before it; to be reset, (n,)."""

@@ -1,12 +1,14 @@
 """The environments of one scene: a model, and a batch of simulations of it stepped in one call."""
 
 from collections.abc import Mapping
+from typing import Any
 
 import mujoco
 import numpy as np
 from mujoco.batch import Batch, SimulationError
 
 from iowbc.arrays import Array, Indices, Mask, as_slice
+from iowbc.control.layout import EVERY
 from iowbc.errors import UsageError
 from iowbc.recipe.evaluation.evaluation import Drake
 from iowbc.recipe.simulation.scene import Scene
@@ -17,6 +19,7 @@ from iowbc.sim.grip import Grip, Squeeze
 from iowbc.sim.model import compile_scene, require_stable
 from iowbc.sim.model_fields import ModelFields
 from iowbc.sim.model_index import BASE_ANGULAR, BASE_LINEAR, ModelIndex
+from iowbc.sim.objects import HANDS as HAND_BODIES
 from iowbc.sim.rolling import Rolling
 from iowbc.sim.shapes import measured
 from iowbc.sim.soles import Soles
@@ -30,8 +33,6 @@ MOTION_ALONE = sum(
     getattr(mujoco.mjtDisableBit, f"mjDSBL_{part}").value for part in ("CONTACT", "CONSTRAINT", "SENSOR", "ACTUATION")
 )
 """Flags that disable all of MuJoCo but positions, velocities and inertia of the bodies."""
-EVERY = slice(None)
-"""All simulations."""
 FEET, HANDS, THING = slice(0, 2), slice(2, 4), 4
 """Places of the bodies whose forces are kept."""
 AT_LIMIT = 0.999
@@ -54,7 +55,7 @@ class World:
         self.model = compile_scene(robot, physics, scene, timing)
         if physics.pd == "explicit":
             require_stable(self.model, robot, timing)
-        self.layout = ModelIndex.of(self.model, robot)
+        self.layout = ModelIndex(self.model, robot)
         self.batch = Batch(self.model, len(rows), nthread=1)
         self.fields = ModelFields(self.batch, self.layout, scene, timing)
         self._flags = self.batch.expand("opt.disableflags")
@@ -67,23 +68,27 @@ class World:
         bodies, thing = np.arange(self.model.nbody), [] if self.layout.object is None else [self.layout.object]
         self._touched = np.concatenate([bodies[self.layout.feet], bodies[self.layout.hands], bodies[thing]])
         self._torque, self._external = self._last_torque.copy(), self._last_external[:, self._touched]
-        """Torques of the motors, torques and forces on `FEET`, `HANDS` and `THING` from what they touch, in the last
-        physics step."""
+        """Torques of the motors; contact torques and forces on `FEET`, `HANDS`, `THING`, in the last physics step."""
         self._body_position, self._body_quaternion, self._body_rotation = bind("xpos"), bind("xquat"), bind("xmat")
         self._inertia = bind("M")
-        kept, count, history = timing.kept_targets, len(rows), bind("history")
-        targets = history[:, self.layout.past_targets].reshape(count, -1, 2 + 2 * kept)
+        self._momentum_speeds = slice(3, self.layout.joint_speeds.stop)
+        self._momentum = self.model.M_rowadr[self._momentum_speeds] + np.arange(3)[:, None]
+        """Entries of the inertia matrix that couple the base's translation to the robot's other speeds, (3, speeds)."""
+        kept, history = timing.kept_targets, bind("history")
+        targets = history[:, : self.model.nu * (2 + 2 * kept)].reshape(len(rows), -1, 2 + 2 * kept)
         self._past_targets = targets[..., 2 + kept :]
-        past_ground = _past(history, self.layout.past_ground, timing.substeps)
+        """The history begins with two counters, times and targets of each motor."""
+        past_ground = _force_history(self.model, history, robot.sole_bodies)
         self.soles = Soles(robot, self.batch, self.layout, self._external[:, FEET], past_ground, physics.contact_force)
         if self.layout.object is not None:
-            self._past_forces = _past(history, self.layout.past_forces, timing.substeps)
+            self._past_forces = _force_history(self.model, history, HAND_BODIES)
         self._spatial_velocity, self._subtree_com, self._sites = bind("cvel"), bind("subtree_com"), bind("site_xpos")
         self._centres = bind("xipos")
         self._squeeze, self._grip = self._grasp(scene)
         self._rolling = Rolling(self.batch, self.layout, self.fields, scene) if scene.kind == "push" else None
         self._memory: dict[str, Array] = {} if self._rolling is None else {"touch": self._rolling.touch}
-        self._memory |= {} if self._grip is None else self._grip.arrays()
+        if self._grip is not None:
+            self._memory |= {"grip_angle": self._grip.angle, "grip_rate": self._grip.rate}
         self._warning_counts = self.batch.warning[:, :, 1]
         self._warnings = self._warning_counts.copy()
         self.before = self.batch.state.copy()
@@ -232,8 +237,7 @@ class World:
         self._keep(ids)
 
     def release(self, state: SimulationState, slip_force: Array) -> None:
-        """Releases hands whose grip carried more than its slip force, (all environments,) [N], at any physics step of
-        the period."""
+        """Releases hands whose grip carried more than `slip_force`, (all environments,) [N], in any physics step."""
         if self.scene.kind == "free":
             return
         load = np.vecdot(self._past_forces, self._past_forces).max(axis=2)
@@ -282,8 +286,8 @@ class World:
 
     def _robot_velocity(self) -> Array:
         """Velocity of the robot's centre of mass, (n, 3) [m/s]: momentum, in the first rows of M qvel, by mass."""
-        momentum = self._inertia.take(self.layout.momentum, axis=1)
-        momentum *= self.qvel[:, None, self.layout.momentum_speeds]
+        momentum = self._inertia.take(self._momentum, axis=1)
+        momentum *= self.qvel[:, None, self._momentum_speeds]
         velocity = momentum.sum(axis=2)
         velocity /= self.robot_mass[:, None]
         velocity += self.qvel[:, BASE_LINEAR]
@@ -326,7 +330,7 @@ class World:
         return own | {"state": self.batch.state.copy(), "warnings": self._warnings.copy()} | self.fields.snapshot()
 
     def restore(self, values: Mapping[str, Array]) -> None:
-        """Inverse of `snapshot`, or of `record` for all; the simulations then continue bit for bit."""
+        """Inverse of `snapshot`: the simulations then continue bit for bit."""
         self.fields.restore(values)
         for name, array in self._memory.items():
             array[...] = values[name]
@@ -339,8 +343,7 @@ class World:
 def make_world(
     robot: Robot, physics: Physics, scene: Scene, rows: Indices, timing: Timing, drake: Drake | None
 ) -> World:
-    """The environments of a scene, stepped by Drake if its settings are given, else by MuJoCo. Raises UsageError if
-    Drake, an extra, is not installed."""
+    """The environments of a scene, stepped by MuJoCo, or by Drake with its settings; UsageError if Drake is missing."""
     if drake is None:
         return World(robot, physics, scene, rows, timing)
     try:
@@ -352,7 +355,10 @@ def make_world(
     return DrakeWorld(robot, physics, scene, rows, timing, drake)
 
 
-def _past(history: Array, place: slice, substeps: int) -> Array:
-    """Forces of a pair of sensors in the physics steps of the last control period, (n, 2, substeps, 3) [N]."""
-    kept = history[:, place].reshape(len(history), 2, -1)
+def _force_history(model: Any, history: Array, names: tuple[str, str]) -> Array:
+    """Forces of a pair of sensors in the physics steps of the last control period, (n, 2, substeps, 3) [N]. The history
+    of each holds two counters, times and forces."""
+    first = model.sensor(names[0]).id
+    start, substeps = int(model.sensor_historyadr[first]), int(model.sensor_history[first, 0])
+    kept = history[:, start : start + 2 * (2 + 4 * substeps)].reshape(len(history), 2, -1)
     return kept[..., 2 + substeps :].reshape(len(history), 2, substeps, 3)

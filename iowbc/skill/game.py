@@ -106,13 +106,13 @@ class TransportGame:
         """Starts the first episode of every game, the same each time, or that of the seeds (n,) uint64. `agent_share`:
         fraction of the sampled episodes from now on in which the human agent acts."""
         own = [None if seeds is None else seeds[first:last] for first, last in self._workers.groups]
-        self._ask([Message.of(GameBatch.reset, part, agent_share) for part in own])
+        self._ask([Message(GameBatch.reset, (part, agent_share)) for part in own])
         return self._observed("now")
 
     def step(self, actions: Mapping[str, Array]) -> GameOutcome:
         """One decision; actions by agent, (n, k) in [-1, 1]. Raises ValueError if not finite or of another shape."""
         self.act(actions)
-        self._ask([Message.of(GameBatch.step)] * len(self._workers.groups))
+        self._ask([Message(GameBatch.step)] * len(self._workers.groups))
         return self.outcome()
 
     def act(self, actions: Mapping[str, Array]) -> None:

@@ -59,7 +59,7 @@ class RemoteWorkers(Workers):
         found = self._pool.answers()
         if self._changes:
             for group, state in zip(self.groups, self._pool.states, strict=True):
-                for name, values in self.buffers.rows(*group).arrays.items():
+                for name, values in self.buffers.rows(*group).items():
                     values[:] = state[f"buffer/{name}"]
         return found
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from iowbc.arrays import Array, Indices, as_slice
 from iowbc.control import gait
 from iowbc.control.action import action_scale
-from iowbc.control.command import HEIGHT, OFFSET, VELOCITY
+from iowbc.control.command import HEIGHT, OFFSET, VELOCITY, YAW_RATE
 from iowbc.control.layout import EVERY
 from iowbc.control.observation import PolicyInputs
 from iowbc.recipe.simulation.holding import FREE
@@ -23,13 +23,7 @@ from iowbc.task.layout import full_layout
 from iowbc.task.motion import Motion
 from iowbc.task.planned_pushes import PlannedPulls, PlannedPushes
 from iowbc.task.privileged import Truth
-from iowbc.task.record.recorder import (
-    count_endings,
-    count_pushes,
-    count_step,
-    write_signals,
-    write_trial_signals,
-)
+from iowbc.task.record import recorder
 from iowbc.task.schedule import Schedule
 from iowbc.task.vector.shared import Buffers
 
@@ -53,7 +47,7 @@ class Batch:
         self._joint_reference = np.tile(self.robot.default_position, (n, 1))
         self.scenes = np.array(scenes)
         """Name of each environment's scene, (n,)."""
-        self.memory = EpisodeState.blank(n, len(self.robot.interaction), len(self.robot.support))
+        self.memory = EpisodeState(n, len(self.robot.interaction), len(self.robot.support))
         self._schedule = schedule = Schedule(
             task, self.memory, environments=np.arange(first, last), seed=setup.seed, trials=episodes
         )
@@ -94,7 +88,14 @@ class Batch:
         for name in ("reward", "done", "truncated", "terminal_observation"):
             self.buffers[name][:] = 0
         self._observe(moved)
-        write_signals(self.buffers, self.simulation.state, moved, self.memory, Ending.none(self.n), self.period)
+        recorder.write_signals(
+            self.buffers,
+            self.simulation.state,
+            moved,
+            self.memory,
+            Ending(*np.zeros((5, self.n), np.bool_)),
+            self.period,
+        )
 
     def reseed(self, seeds: NDArray[np.uint64]) -> None:
         """Reseeds all random number streams from seeds (n,)."""
@@ -117,7 +118,7 @@ class Batch:
             simulation.planned_impulse[:] = self._pulls.force(memory.steps, memory.heading_reference)
         simulation.step()
         memory.steps += 1
-        self.guidance.turn(memory)
+        memory.heading_reference += memory.command[:, YAW_RATE] * self.period
         judgement = self.judge.judge(
             simulation.state,
             memory,
@@ -134,10 +135,10 @@ class Batch:
     def record(self, judgement: Judgement, action: Array) -> None:
         """Writes signals and counters of the step just made with an action (n, 15)."""
         simulation, ending = self.simulation, judgement.ending
-        count_step(self.buffers, judgement, self.memory)
-        write_signals(self.buffers, simulation.state, judgement.motion, self.memory, ending, self.period)
+        recorder.count_step(self.buffers, judgement, self.memory)
+        recorder.write_signals(self.buffers, simulation.state, judgement.motion, self.memory, ending, self.period)
         if self._schedule.repeats:
-            write_trial_signals(self.buffers, simulation, action * self._scale)
+            recorder.write_trial_signals(self.buffers, simulation, action * self._scale)
 
     def feed_partner(self, feed: Array) -> None:
         """Writes the entries of the command that the partner receives, (n, 4)."""
@@ -147,11 +148,11 @@ class Batch:
 
     def finish(self, judgement: Judgement) -> None:
         """Writes the results of the step, and starts a new episode where one has ended."""
-        memory, buffers, ending, scored = self.memory, self.buffers, judgement.ending, judgement.scored
-        memory.total += scored.reward
-        memory.tracking += scored.tracking
+        memory, buffers, ending, reward = self.memory, self.buffers, judgement.ending, judgement.terms.sum(axis=1)
+        memory.total += reward
+        memory.tracking += judgement.tracking
         done = ending.done
-        buffers["reward"][:] = scored.reward
+        buffers["reward"][:] = reward
         buffers["done"][:] = done
         buffers["truncated"][:] = ending.truncated
         self._observe(judgement.motion)
@@ -161,13 +162,12 @@ class Batch:
         buffers["terminal_observation"][which] = buffers["observation"][which]
         buffers["episode_return"][which] = memory.total[which]
         buffers["episode_length"][which] = memory.steps[which]
-        count_endings(buffers, ending, self._schedule.causes(ending), which)
+        recorder.count_endings(buffers, ending, self._schedule.causes(ending), which)
         self._schedule.promote(ending, which)
         self._observe(self.begin(which), which)
 
     def begin(self, which: Indices) -> Motion:
-        """Starts new episodes in some environments, (k,): commands, references, robot and object. Returns the motion of
-        all."""
+        """Starts new episodes in some environments, (k,). Returns the motion of all."""
         memory = self.memory
         key = self._schedule.start(which)
         joints, pitch = self.guidance.start(which, memory, key)
@@ -175,7 +175,7 @@ class Batch:
         self.simulation.hold(self._schedule.scales(which, key), which)
         self.simulation.reset(which, joints, base_pitch=pitch, key=key)
         memory.infeasible[which] = self.simulation.infeasible[which]
-        count_pushes(self.buffers, self._pushing, memory, which)
+        recorder.count_pushes(self.buffers, self._pushing, memory, which)
         moved = self.judge.motion(self.simulation.state)
         memory.heading_reference[which] = moved.heading[which]
         memory.heading_offset[which] = (self.simulation.measured.heading[:, 0] - moved.heading)[which]
@@ -222,7 +222,7 @@ class Batch:
         schedule = self._schedule
         own = vars(self.memory) | {"key": schedule.key, "episode_key": schedule.episode_key}
         saved = {f"task/{name}": values.copy() for name, values in own.items()}
-        saved |= {f"buffer/{name}": values.copy() for name, values in self.buffers.arrays.items()}
+        saved |= {f"buffer/{name}": values.copy() for name, values in self.buffers.items()}
         return saved | self.simulation.snapshot()
 
     def restore(self, saved: Mapping[str, Array]) -> None:
@@ -231,7 +231,7 @@ class Batch:
             values[...] = saved[f"task/{name}"]
         schedule = self._schedule
         schedule.key[:], schedule.episode_key[:] = saved["task/key"], saved["task/episode_key"]
-        for name, values in self.buffers.arrays.items():
+        for name, values in self.buffers.items():
             values[:] = saved[f"buffer/{name}"]
         self.simulation.reseed(schedule.key)
         self.simulation.restore(saved)

@@ -1,11 +1,14 @@
 """The curriculum: difficulty at the levels of its axes, and updates of an environment's levels."""
 
-from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from iowbc.arrays import Array, Mask
 from iowbc.recipe.task.curriculum import Ceilings, Curriculum
+
+if TYPE_CHECKING:
+    from iowbc.task.progress import EpisodeOutcome
 
 AXES = ("posture", "locomotion", "load", "disturbance")
 """Columns of the levels."""
@@ -21,32 +24,6 @@ FULL_RANGE_LEVEL = 1.0
 """Level at which the recipe's ranges are used in full; above it commands and loads may be infeasible."""
 ROUNDING = 1e-9
 """Tolerance for comparing levels, which are sums of rises."""
-
-
-@dataclass(frozen=True)
-class EpisodeOutcome:
-    """Results of the episodes of n environments, each (n,)."""
-
-    survived: Mask
-    """Reached the time limit."""
-    progress_in_time: Array
-    """Fraction of the time limit that was reached."""
-    posture: Array
-    """The worse of the mean scores of height and pitch, 0 to 1."""
-    walked: Array
-    """Time with a commanded velocity [s]."""
-    covered: Array
-    """Fraction of the commanded displacement that was covered; 1 if none was commanded."""
-    heading: Array
-    """Mean heading error [rad]."""
-    infeasible: Mask
-    """The crate's rolling resistance exceeded the friction of the feet."""
-    stepping: Mask
-    """The gait clock was running at the end."""
-    lagged: Mask
-    """Ended because it lagged behind the command."""
-    disturbed: Mask
-    """An impulse or a push acted shortly before the end."""
 
 
 def initial_levels(curriculum: Curriculum, n: int) -> Array:
@@ -78,7 +55,7 @@ def phase(curriculum: Curriculum, levels: Array) -> Array:
     return 1 + first.astype(np.int64) + second
 
 
-def next_levels(curriculum: Curriculum, levels: Array, played: Array, outcome: EpisodeOutcome) -> Array:
+def next_levels(curriculum: Curriculum, levels: Array, played: Array, outcome: "EpisodeOutcome") -> Array:
     """Levels after an episode, (n, axes). An axis whose effective level was capped keeps its level."""
     if not curriculum.enabled:
         return levels
@@ -90,7 +67,7 @@ def next_levels(curriculum: Curriculum, levels: Array, played: Array, outcome: E
     return np.clip(moved, 0.0, np.maximum(ceiling, levels))
 
 
-def _success(curriculum: Curriculum, played: Array, outcome: EpisodeOutcome) -> Mask:
+def _success(curriculum: Curriculum, played: Array, outcome: "EpisodeOutcome") -> Mask:
     steady = outcome.survived & (outcome.posture >= curriculum.tracking)
     walked = outcome.walked >= curriculum.least_walk
     there = (outcome.covered >= curriculum.progress) & (outcome.heading <= curriculum.heading)
@@ -102,7 +79,7 @@ def _success(curriculum: Curriculum, played: Array, outcome: EpisodeOutcome) -> 
     return success
 
 
-def _failure(curriculum: Curriculum, played: Array, outcome: EpisodeOutcome) -> Mask:
+def _failure(curriculum: Curriculum, played: Array, outcome: "EpisodeOutcome") -> Mask:
     ended = ~outcome.survived & (outcome.progress_in_time < curriculum.early)
     walking = outcome.stepping | outcome.lagged
     pushed = outcome.disturbed & (played[:, DISTURBANCE] > 0.0) & ~outcome.lagged

@@ -1,7 +1,6 @@
 """Conditions that end an episode: falls, drops, lag behind the command, time limits, divergence."""
 
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 
@@ -19,10 +18,6 @@ class Ending:
     lagging: Mask
     time_limit: Mask
     diverged: Mask
-
-    @classmethod
-    def none(cls, n: int) -> Self:
-        return cls(*np.zeros((5, n), np.bool_))
 
     @property
     def failed(self) -> Mask:

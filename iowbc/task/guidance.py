@@ -8,7 +8,7 @@ from iowbc import counter_random as random
 from iowbc.arrays import Array, Indices, Keys, Mask, as_slice
 from iowbc.control.action import action_scale
 from iowbc.control.chain import Frames
-from iowbc.control.command import HEIGHT, YAW_RATE
+from iowbc.control.command import HEIGHT
 from iowbc.control.references import ReferenceLayer, both_wrists
 from iowbc.control.sensors import Measured
 from iowbc.robot.description import Robot
@@ -76,10 +76,6 @@ class Guidance:
         )
         memory.phase[:], memory.stepping[:], memory.feedback[:] = phase, stepping, feedback
         memory.support[:] = self.references.with_stride(posture, memory.command, phase, stepping, feedback)
-
-    def turn(self, memory: EpisodeState) -> None:
-        """Turns the heading reference by the yaw rate that was commanded in the step just made."""
-        memory.heading_reference += memory.command[:, YAW_RATE] * self._period
 
     def targets(self, memory: EpisodeState, action: Array) -> Array:
         """Joint targets of an action (n, 15) in the next step, (n, joints) [rad]: θ_S_ref + scale·a, θ_I_ref.

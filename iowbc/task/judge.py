@@ -14,9 +14,9 @@ from iowbc.sim.state import SimulationState
 from iowbc.task.curriculum import FULL_RANGE_LEVEL, LOCOMOTION
 from iowbc.task.endings import Ending, dropped, fallen, lagging, lost
 from iowbc.task.episode_state import EpisodeState
-from iowbc.task.motion import Motion, low_pass, motion
+from iowbc.task.motion import Motion, low_pass
 from iowbc.task.progress import follow
-from iowbc.task.rewards.reward import RewardFunction, RewardResult
+from iowbc.task.rewards.reward import RewardFunction
 from iowbc.task.rewards.table import Step
 from iowbc.task.yielding import Admittance, excess_force
 
@@ -27,7 +27,10 @@ class Judgement:
 
     motion: Motion
     ending: Ending
-    scored: RewardResult
+    terms: Array
+    """Each term's part of the reward, in the order of `term_names`, (n, terms)."""
+    tracking: Array
+    """Scores of the terms `TRACKED`, between 0 and 1, (n, tracked)."""
     heading_error: Array
     """Heading less its reference, (n,) [rad]."""
 
@@ -45,7 +48,7 @@ class Judge:
         self._admittance = Admittance(recipe.task.reward.yielding, holding)
 
     def motion(self, state: SimulationState) -> Motion:
-        return motion(state, self._height)
+        return Motion(state, self._height)
 
     def judge(
         self,
@@ -95,8 +98,8 @@ class Judge:
             object_place=place,
             ended=ending.failed,
         )
-        scored = self._reward(step, ending.diverged, memory.played[:, LOCOMOTION])
-        return Judgement(moved, ending, scored, error)
+        terms, tracking = self._reward(step, ending.diverged, memory.played[:, LOCOMOTION])
+        return Judgement(moved, ending, terms, tracking, error)
 
     def _filter(self, memory: EpisodeState, moved: Motion, resistance: Array) -> None:
         """Low-passes velocities, and the hand force beyond the robot's share of a crate's `resistance` (n,) [N]."""

@@ -40,8 +40,7 @@ class PlannedPulls:
         self._period = period
 
     def force(self, step: Indices, heading: Array) -> Array:
-        """World force over the period that begins at `step` (n,), evaluated at its midpoint, (n, 3) [N]; `heading`:
-        commanded, (n,) [rad]."""
+        """World force in the middle of the period that begins at `step` (n,), (n, 3) [N]; `heading` as of a push."""
         time = (step + 0.5) * self._period
         acting = (time > self._begin) & (time < self._end)
         size = np.where(acting, np.sin(self._rate * np.where(acting, time - self._begin, 0.0)), 0.0)

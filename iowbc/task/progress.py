@@ -6,7 +6,6 @@ from iowbc.arrays import Array, Mask
 from iowbc.control.command import VELOCITY, YAW_RATE
 from iowbc.recipe.task.task import Termination
 from iowbc.robot.rotations import TINY
-from iowbc.task.curriculum import EpisodeOutcome
 from iowbc.task.endings import Ending
 from iowbc.task.episode_state import EpisodeState
 from iowbc.task.rewards.terms import progress
@@ -28,19 +27,30 @@ def follow(
     memory.undisturbed[:] = np.where(disturbed, 0, memory.undisturbed + 1)
 
 
-def outcome(memory: EpisodeState, ending: Ending, period: float, blame: float) -> EpisodeOutcome:
-    """Results of the episodes that end in this step; `blame`: time for which a disturbance counts as recent [s]."""
-    steps = np.maximum(memory.steps, 1)
-    moved = memory.commanded > TINY
-    return EpisodeOutcome(
-        survived=ending.truncated,
-        progress_in_time=memory.steps / memory.limit,
-        posture=memory.tracking.min(axis=1) / steps,
-        walked=memory.walked * period,
-        covered=np.where(moved, memory.covered / np.maximum(memory.commanded, TINY), 1.0),
-        heading=memory.heading_error / steps,
-        infeasible=memory.infeasible.copy(),
-        stepping=memory.stepping.copy(),
-        lagged=ending.lagging,
-        disturbed=memory.undisturbed * period <= blame,
-    )
+class EpisodeOutcome:
+    """Results of the episodes of n environments that end in this step, each (n,)."""
+
+    def __init__(self, memory: EpisodeState, ending: Ending, period: float, blame: float) -> None:
+        """`blame`: time for which a disturbance counts as recent [s]."""
+        steps = np.maximum(memory.steps, 1)
+        moved = memory.commanded > TINY
+        self.survived = ending.truncated
+        """Reached the time limit."""
+        self.progress_in_time = memory.steps / memory.limit
+        """Fraction of the time limit that was reached."""
+        self.posture = memory.tracking.min(axis=1) / steps
+        """The worse of the mean scores of height and pitch, 0 to 1."""
+        self.walked = memory.walked * period
+        """Time with a commanded velocity [s]."""
+        self.covered = np.where(moved, memory.covered / np.maximum(memory.commanded, TINY), 1.0)
+        """Fraction of the commanded displacement that was covered; 1 if none was commanded."""
+        self.heading = memory.heading_error / steps
+        """Mean heading error [rad]."""
+        self.infeasible = memory.infeasible.copy()
+        """The crate's rolling resistance exceeded the friction of the feet."""
+        self.stepping = memory.stepping.copy()
+        """The gait clock was running at the end."""
+        self.lagged = ending.lagging
+        """Ended because it lagged behind the command."""
+        self.disturbed = memory.undisturbed * period <= blame
+        """An impulse or a push acted shortly before the end."""

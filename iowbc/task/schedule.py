@@ -13,7 +13,7 @@ from iowbc.task.curriculum import difficulty, initial_levels, next_levels, playe
 from iowbc.task.endings import Ending
 from iowbc.task.episode_state import EpisodeState
 from iowbc.task.episodes import Episode
-from iowbc.task.progress import outcome
+from iowbc.task.progress import EpisodeOutcome
 
 
 class Schedule:
@@ -116,7 +116,7 @@ class Schedule:
         if self._trials is not None:
             return
         memory, curriculum = self._memory, self._task.curriculum
-        went = outcome(memory, ending, self._period, curriculum.blame)
+        went = EpisodeOutcome(memory, ending, self._period, curriculum.blame)
         moved = next_levels(curriculum, memory.level, memory.played, went)
         chosen = which[~ending.diverged[which]]
         memory.level[chosen] = moved[chosen]

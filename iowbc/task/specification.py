@@ -21,6 +21,5 @@ class Specification:
 
     @property
     def deployed(self) -> Self:
-        """The same for a policy that does not see s_priv: without its user-defined parts, whose file is then not
-        executed."""
+        """The same for a policy that does not see s_priv: the file of its user-defined parts is not executed."""
         return replace(self, recipe=self.recipe.deployed)

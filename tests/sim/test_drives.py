@@ -21,7 +21,7 @@ def drives(robot):
         "linkage_effort": np.full((1, len(robot.linkages)), 50.0),
     }
     made.reset(np.arange(1), strong)
-    return made, SimulationState.empty(1, len(robot.joints))
+    return made, SimulationState(1, len(robot.joints))
 
 
 def test_torque_falls_with_speed_when_driving_and_not_when_braking(robot, drives):

@@ -30,7 +30,7 @@ class Handle:
         held |= {"partner_behaviour": BEHAVIOURS.index(behaviour), "partner_share": share, "object_mass": MASS}
         fixed = {name: np.array([float(value)]) for name, value in held.items()}
         draws.draw(np.arange(1), np.ones(1, np.uint64), fixed)
-        self.state = SimulationState.empty(1, 29)
+        self.state = SimulationState(1, 29)
         self.state.base_rotation[:] = np.eye(3)
         self.partner = Partner(simulation.partner, scenes, PERIOD)
         self.partner.reset(np.arange(1), draws.values, self.state)

@@ -1,7 +1,7 @@
 """Each axis of the curriculum moves by its own measure, each environment for itself, in the order of the phases."""
 
 from collections.abc import Callable
-from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -9,13 +9,13 @@ import pytest
 from task_worlds import actions
 
 from iowbc.recipe.task.curriculum import Curriculum
-from iowbc.task.curriculum import AXES, EpisodeOutcome, difficulty, initial_levels, next_levels, phase, played_levels
+from iowbc.task.curriculum import AXES, difficulty, initial_levels, next_levels, phase, played_levels
 from iowbc.task.vector.vector_env import VectorEnv
 
 Make = Callable[..., VectorEnv]
 RECIPE = Curriculum(rise=0.1, fall=0.05)
 YES, NO = np.array([True]), np.array([False])
-WELL = EpisodeOutcome(
+WELL: Any = SimpleNamespace(
     survived=YES,
     progress_in_time=np.ones(1),
     posture=np.array([0.8]),
@@ -27,13 +27,18 @@ WELL = EpisodeOutcome(
     lagged=NO,
     disturbed=NO,
 )
+
+
+def replace(outcome: Any, **changes: Any) -> Any:
+    assert changes.keys() <= vars(outcome).keys()
+    return SimpleNamespace(**vars(outcome) | changes)
+
+
 ENDED = replace(WELL, survived=NO, progress_in_time=np.array([0.3]))
 LEVEL = {"posture": 0.5, "locomotion": 0.4, "load": 0.5, "disturbance": 0.2}
 
 
-def moved(
-    outcome: EpisodeOutcome, level: dict[str, float] | None = None, recipe: Curriculum = RECIPE
-) -> dict[str, float]:
+def moved(outcome: Any, level: dict[str, float] | None = None, recipe: Curriculum = RECIPE) -> dict[str, float]:
     """What an episode that was played at its own levels adds to each axis."""
     levels = np.array([list((level or LEVEL).values())])
     change = next_levels(recipe, levels, levels, outcome) - levels

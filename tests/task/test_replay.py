@@ -19,7 +19,7 @@ EVERY = np.arange(COUNT)
 def schedule(recipe: Recipe):
     def make(replay: float) -> Schedule:
         task = changed(recipe, "task.curriculum.replay", replay).task
-        memory = EpisodeState.blank(COUNT, 14, 15)
+        memory = EpisodeState(COUNT, 14, 15)
         return Schedule(task, memory, environments=EVERY, seed=0, trials=None)
 
     return make
@@ -27,7 +27,7 @@ def schedule(recipe: Recipe):
 
 def ended(*fallen: bool) -> Ending:
     fell = np.array(fallen)
-    return replace(Ending.none(COUNT), fallen=fell, time_limit=~fell)
+    return replace(Ending(*np.zeros((5, COUNT), bool)), fallen=fell, time_limit=~fell)
 
 
 def test_an_episode_that_failed_is_played_again_until_it_is_survived(schedule) -> None:

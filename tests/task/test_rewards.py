@@ -14,7 +14,7 @@ from task_worlds import QUIET, rollout
 
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.task.reward import Kernel, Reward, Smoothness
-from iowbc.task.rewards import terms
+from iowbc.task.rewards import reward, terms
 from iowbc.task.rewards.reward import RewardFunction, kernel
 from iowbc.task.rewards.table import TERMS, Step
 from iowbc.task.rewards.terms import squared_norm
@@ -105,7 +105,7 @@ def test_torque_costs_beyond_the_comfortable_part_of_its_limit() -> None:
     assert terms.effort(torque, limit, 0.5) == pytest.approx([0.4**2 + 2.5**2])
 
 
-def test_weights_of_a_robot_that_walks_take_over_with_its_level() -> None:
+def test_weights_of_a_robot_that_walks_take_over_with_its_level(monkeypatch: pytest.MonkeyPatch) -> None:
     recipe = Reward.model_validate(
         {"alive": 0.5, "later": {"begin": 0.5, "end": 1.0, "weights": {"alive": 1.5, "termination": -25.0}}}
     )
@@ -115,7 +115,8 @@ def test_weights_of_a_robot_that_walks_take_over_with_its_level() -> None:
     }
     step = SimpleNamespace(command=np.zeros((4, 11)))
     level, none = np.array([0.2, 0.75, 1.0, 2.0]), np.zeros(4, bool)
-    found = RewardFunction(recipe, 0.02, table)(step, none, level).terms  # type: ignore[arg-type]
+    monkeypatch.setattr(reward, "TERMS", table)
+    found = RewardFunction(recipe, 0.02)(step, none, level)[0]  # type: ignore[arg-type]
     column = list(TERMS).index
     assert found[:, column("alive")] == pytest.approx([0.01, 0.02, 0.03, 0.03])
     assert found[:, column("termination")] == pytest.approx([0.0, 0.0, 0.0, -25.0])
@@ -227,7 +228,9 @@ def test_a_new_term_is_a_function_and_a_line_in_the_table(
     assert env.statistics()["reward/smooth.made_up"] == pytest.approx(6.0)
 
 
-def test_a_term_without_weight_is_not_computed_unless_it_says_how_well_the_robot_tracks() -> None:
+def test_a_term_without_weight_is_not_computed_unless_it_says_how_well_the_robot_tracks(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     called: list[str] = []
     table = {path: (lambda step, path=path: called.append(path) or np.ones(1)) for path in TERMS}
     weightless = {"weight": 0.0}
@@ -235,7 +238,8 @@ def test_a_term_without_weight_is_not_computed_unless_it_says_how_well_the_robot
     recipe = recipe.model_copy(
         update={"sync": recipe.sync.model_copy(update={"height": Kernel(weight=0.0, width=1.0)})}
     )
-    RewardFunction(recipe, 0.02, table)(SimpleNamespace(command=np.zeros((1, 11))), np.array([False]), np.ones(1))  # type: ignore[arg-type]
+    monkeypatch.setattr(reward, "TERMS", table)
+    RewardFunction(recipe, 0.02)(SimpleNamespace(command=np.zeros((1, 11))), np.array([False]), np.ones(1))  # type: ignore[arg-type]
     idle = {"alive", "sync.support_reference", "sync.lateral_reference", "object.beside", "yielding.force"}
     idle |= {"smooth.action_curvature", "smooth.effort", "gait.touchdown", "gait.recovery"}
     assert set(TERMS) - set(called) == idle

@@ -18,8 +18,7 @@ from iowbc.sim.world import FEET, HANDS, THING, World
 
 
 class DrakeWorld(World):
-    """n environments of one scene. Drake integrates the physics; MuJoCo holds parameters and states, and computes the
-    kinematics."""
+    """n environments of one scene: Drake steps them, MuJoCo holds parameters and states and computes the kinematics."""
 
     def __init__(
         self, robot: Robot, physics: Physics, scene: Scene, rows: Indices, timing: Timing, settings: Drake

@@ -52,7 +52,7 @@ class Appearance:
         world, index, data = self._world, self._index, self.data
         data.qpos[:], data.qvel[:] = world.qpos[index], world.qvel[index]
         if world.layout.object_geom is not None:
-            self.model.geom("object").size[:] = world.fields.half_size(np.array([index]))[0]
+            self.model.geom("object").size[:] = world.fields.of(index)["geom_size"][world.layout.object_geom]
         mujoco.mj_kinematics(self.model, data)
         mujoco.mj_comPos(self.model, data)
         mujoco.mj_camlight(self.model, data)
@@ -95,9 +95,8 @@ def _origin(joint: ElementTree.Element) -> Any:
 
 def _replace_by_meshes(spec: Any, robot: Robot, meshes: list[Mesh]) -> None:
     """Draws the meshes, and hides the robot's primitive shapes in a group that is not drawn."""
-    bodies = set(robot.tree.bodies)
     for geom in spec.geoms:
-        if geom.parent.name in bodies:
+        if geom.parent.name in robot.tree.bodies:
             geom.group = 4
     for mesh in meshes:
         spec.add_mesh(name=mesh.link, file=str(mesh.file))

@@ -2,6 +2,7 @@
 
 import ctypes.util
 import os
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,7 @@ CARDS = ("/dev/nvidia0", "/dev/dri/renderD128")
 
 
 def backend() -> str:
-    """The backend that `MUJOCO_GL` asks for, which commands pass on as `IOWBC_GL`; without it EGL where there is a
-    graphics card, else software."""
+    """The backend in `MUJOCO_GL`, which commands pass on as `IOWBC_GL`; else EGL with a graphics card, or OSMesa."""
     asked = os.environ.get("IOWBC_GL", os.environ.get("MUJOCO_GL", "")).strip().lower()
     if asked in BACKENDS:
         if not ctypes.util.find_library(BACKENDS[asked]):
@@ -37,11 +37,7 @@ def context(width: int, height: int) -> Any:
     """A current OpenGL context; `free` it after use."""
     chosen = backend()
     try:
-        if chosen == "egl":
-            from mujoco.egl import GLContext
-        else:
-            from mujoco.osmesa import GLContext
-        made = GLContext(width, height)
+        made = import_module(f"mujoco.{chosen}").GLContext(width, height)
         made.make_current()
     except Exception as error:
         other = "osmesa" if chosen == "egl" else "egl"

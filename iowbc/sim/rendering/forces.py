@@ -19,8 +19,7 @@ COLOURS = {
     "ground": (0.2, 0.4, 0.85, 1.0),
     "band": (0.55, 0.3, 0.7, 1.0),
 }
-"""By kind: of the partner, of pushes and impulses, of the object on the hands, of the ground on the feet, of the band
-from which a robot hangs."""
+"""By kind: partner, pushes and impulses, object on the hands, ground on the feet, band from which a robot hangs."""
 BESIDE = 0.09
 """Forces on hands and feet are drawn this far outside of them, where the limbs do not hide them [m]."""
 
@@ -44,9 +43,7 @@ class Force:
 
 def forces(simulation: Simulation, env: int) -> Iterator[Force]:
     """Forces of the last control period, of at least `SMALLEST_FORCE`."""
-    for force in _all(simulation, env):
-        if np.linalg.norm(force.force) >= SMALLEST_FORCE:
-            yield force
+    return (force for force in _all(simulation, env) if np.linalg.norm(force.force) >= SMALLEST_FORCE)
 
 
 def _all(simulation: Simulation, env: int) -> Iterator[Force]:

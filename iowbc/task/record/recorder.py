@@ -11,7 +11,7 @@ from iowbc.task.endings import Ending
 from iowbc.task.episode_state import EpisodeState
 from iowbc.task.judge import Judgement
 from iowbc.task.motion import Motion
-from iowbc.task.record.signals import ACTION_SIGNAL, COUNTERS, ERRORS, KINDS, REASONS
+from iowbc.task.record.signals import COUNTERS, ERRORS, KINDS
 from iowbc.task.rewards import terms
 from iowbc.task.vector.shared import Buffers
 
@@ -56,7 +56,7 @@ def write_signals(
 
 
 def write_trial_signals(buffers: Buffers, simulation: Simulation, correction: Array) -> None:
-    """The signals that only planned episodes have; see `iowbc.task.record.signals.TRIAL_SIGNALS`.
+    """The signals that only planned episodes have; see `iowbc.task.record.signals.trial_signals`.
 
     correction: what the action adds to the reference, (n, support) [rad].
     """
@@ -73,17 +73,17 @@ def write_trial_signals(buffers: Buffers, simulation: Simulation, correction: Ar
         "partner_velocity": state.partner_velocity,
         "joint_torque": state.joint_torque,
         "joint_saturation": state.saturation,
-        ACTION_SIGNAL: correction,
+        "action": correction,
     }
     for name, columns in values.items():
         buffers[f"signal/{name}"][:] = columns
 
 
 def count_step(buffers: Buffers, judgement: Judgement, memory: EpisodeState) -> None:
-    counters, scored = buffers["counters"], judgement.scored
-    buffers["terms"][:] += scored.terms
+    counters, tracking = buffers["counters"], judgement.tracking
+    buffers["terms"][:] += judgement.terms
     counters[:, COLUMN["steps"]] += 1.0
-    counters[:, COLUMN["tracking"]] += scored.tracking.sum(axis=1) / scored.tracking.shape[1]
+    counters[:, COLUMN["tracking"]] += tracking.sum(axis=1) / tracking.shape[1]
     moved, command = judgement.motion, memory.command
     errors = np.empty((len(command), 1 + len(ERRORS)))
     errors[:, 0] = 1.0
@@ -106,9 +106,8 @@ def count_endings(buffers: Buffers, ending: Ending, causes: dict[str, Mask], whi
     counters[which, COLUMN["return"]] += buffers["episode_return"][which]
     for cause, found in causes.items():
         counters[which, COLUMN[f"fell/{cause}"]] += found[which]
-    reasons = ending.reasons()
-    for name in REASONS:
-        counters[which, COLUMN[name]] += reasons[name][which]
+    for reason, found in ending.reasons().items():
+        counters[which, COLUMN[reason]] += found[which]
 
 
 def count_pushes(buffers: Buffers, pushing: Mask, memory: EpisodeState, which: NDArray[np.intp]) -> None:

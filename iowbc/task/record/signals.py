@@ -42,10 +42,6 @@ sole [m], the downward speed of its lowest corner [m/s], the ground's largest fo
 and its horizontal force in the last one [N]; the size of the net force of thighs, torso and arms on the object, the
 force of partner, impulses and pulls on it [N]; the displacement of its far handle in the step [m], and the
 velocity that the partner intends for it [m/s]."""
-JOINT_SIGNALS = ("joint_torque", "joint_saturation")
-"""Signals of planned episodes with one value per joint: torque [N·m], whether it is at its limit."""
-ACTION_SIGNAL = "action"
-"""Signal of planned episodes with one value per support joint: offset that the action adds to the reference [rad]."""
 
 REASONS = ("fallen", "dropped", "lagging", "time_limit", "diverged")
 """Reasons for the end of an episode."""
@@ -65,5 +61,6 @@ COUNTERS = (
 
 
 def trial_signals(joints: int, support: int) -> dict[str, int]:
-    """Signals only of planned episodes, with sizes; `joints`, `support`: numbers of all and of support joints."""
-    return TRIAL_SIGNALS | dict.fromkeys(JOINT_SIGNALS, joints) | {ACTION_SIGNAL: support}
+    """Signals only of planned episodes, with sizes. In addition to `TRIAL_SIGNALS`: torque [N·m] of all joints, and
+    whether it is at its limit; offset that the action adds to the references of the support joints [rad]."""
+    return TRIAL_SIGNALS | {"joint_torque": joints, "joint_saturation": joints, "action": support}

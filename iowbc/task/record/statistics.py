@@ -37,9 +37,8 @@ class Statistics:
         errors means of absolute values by scene and kind of command.
         """
         total = dict(zip(COUNTERS, counters.sum(axis=0).tolist(), strict=True))
-        rewards = dict(
-            zip(self._terms, (terms.sum(axis=0) / (max(total["steps"], 1.0) * self._period)).tolist(), strict=True)
-        )
+        steps = max(total["steps"], 1.0)
+        rewards = dict(zip(self._terms, (terms.sum(axis=0) / (steps * self._period)).tolist(), strict=True))
         self._carry_errors(counters)
         counters[:], terms[:] = 0.0, 0.0
         if ended := total["episodes"]:
@@ -48,7 +47,7 @@ class Statistics:
         return {
             "reward": sum(rewards.values()),
             **dict(zip((*EPISODIC, *self._errors), self.carried.tolist(), strict=True)),
-            "tracking": total["tracking"] / max(total["steps"], 1.0),
+            "tracking": total["tracking"] / steps,
             "curriculum_level": float(levels.mean()),
             **dict(zip((f"level/{axis}" for axis in AXES), levels.mean(axis=0).tolist(), strict=True)),
             "infeasible_pushes": total["infeasible"] / max(total["pushes"], 1.0),

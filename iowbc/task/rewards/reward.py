@@ -1,7 +1,6 @@
 """The weighted sum of the terms, with its parts."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable
 from operator import attrgetter
 
 import numpy as np
@@ -15,35 +14,22 @@ CONTRACT = "it takes a Step (iowbc/task/rewards/table.py) and returns a finite n
 """Contract of a user-defined term."""
 
 
-@dataclass(frozen=True)
-class RewardResult:
-    """The reward of one step."""
-
-    reward: Array
-    """(n,)."""
-    terms: Array
-    """Each term's part of the reward, in the order of `term_names`, (n, terms)."""
-    tracking: Array
-    """The scores of the terms `TRACKED`, between 0 and 1, (n, tracked)."""
-
-
-@dataclass(frozen=True)
 class WeightedTerm:
     """A term with its weight and kernel width."""
 
-    column: int
-    """Its index among all terms."""
-    function: Term
-    weight: float
-    """Reward per control step for the value 1."""
-    width: float | None
-    """Width of its kernel; None without a kernel."""
+    def __init__(self, column: int, function: Term, setting: float | Kernel | CustomTerm, seconds: float) -> None:
+        """`column`: index among all terms; `setting`: weight, per second or per event, in the recipe; `seconds`: time
+        for which it is given in a control step."""
+        self.column, self._function = column, function
+        weight, self._width = (setting, None) if isinstance(setting, float | int) else (setting.weight, setting.width)
+        self.weight = weight * seconds
+        """Reward per control step for the value 1."""
 
     def value(self, step: Step) -> Array:
         """Value before weighting, (n,)."""
-        value: Array = np.asarray(self.function(step))
-        if self.width is not None:
-            value = kernel(value, self.width)
+        value: Array = np.asarray(self._function(step))
+        if self._width is not None:
+            value = kernel(value, self._width)
         return value if value.ndim == 1 else value.sum(axis=1)
 
 
@@ -55,19 +41,16 @@ def term_names(recipe: Reward) -> tuple[str, ...]:
 class RewardFunction:
     """The reward of a recipe. Terms without a weight, now or later, are computed only if they are in `TRACKED`."""
 
-    def __init__(
-        self, recipe: Reward, period: float, terms: Mapping[str, Term] | None = None, *, own: bool = False
-    ) -> None:
-        """`period`: control period [s]; `terms`: by dotted path in the recipe, by default those of the table; `own`:
-        execute the user-defined terms, which are zero otherwise. Raises StageFailed for one that cannot be used."""
-        table = TERMS if terms is None else terms
-        self._columns = len(table) + len(recipe.own_terms)
-        seconds = dict.fromkeys(ONCE, 1.0) | {path: 0.0 for path in table if path.partition(".")[0] in recipe.without}
-        functions = {**table, **(load_terms(recipe) if own else {})}
-        settings = {path: attrgetter(path)(recipe) for path in table}
+    def __init__(self, recipe: Reward, period: float, *, own: bool = False) -> None:
+        """`period`: control period [s]; `own`: execute the user-defined terms, which are zero otherwise. Raises
+        StageFailed for one that cannot be used."""
+        self._columns = len(TERMS) + len(recipe.own_terms)
+        seconds = dict.fromkeys(ONCE, 1.0) | {path: 0.0 for path in TERMS if path.partition(".")[0] in recipe.without}
+        functions = TERMS | (load_terms(recipe) if own else {})
+        settings = {path: attrgetter(path)(recipe) for path in TERMS}
         settings |= {f"own.{name}": term for name, term in recipe.own_terms.items()}
         weighted = {
-            path: _weighted(column, function, settings[path], seconds.get(path, period))
+            path: WeightedTerm(column, function, settings[path], seconds.get(path, period))
             for column, (path, function) in enumerate(functions.items())
         }
         self._terms = [term for path, term in weighted.items() if term.weight != 0.0 or path in TRACKED]
@@ -82,9 +65,9 @@ class RewardFunction:
             if changed not in self._terms:
                 self._terms.append(changed)
 
-    def __call__(self, step: Step, diverged: Mask, level: Array) -> RewardResult:
-        """Reward of one control step at levels of locomotion (n,). `diverged` environments, (n,), get the penalty of a
-        fall and no other term."""
+    def __call__(self, step: Step, diverged: Mask, level: Array) -> tuple[Array, Array]:
+        """Each term's part of the reward of a step, (n, terms), and scores of the terms `TRACKED`, (n, tracked).
+        `level`: of locomotion, (n,). `diverged` environments, (n,), get the penalty of a fall and no other term."""
         terms = np.zeros((len(step.command), self._columns))
         for term in self._terms:
             terms[:, term.column] = term.value(step)
@@ -97,13 +80,7 @@ class RewardFunction:
             part = ((level - later.begin) / (later.end - later.begin)).clip(0.0, 1.0)
             weights = weights + part[:, None] * self._change
         terms *= weights
-        return RewardResult(reward=terms.sum(axis=1), terms=terms, tracking=tracking)
-
-
-def _weighted(column: int, function: Term, setting: float | Kernel | CustomTerm, seconds: float) -> WeightedTerm:
-    if isinstance(setting, Kernel | CustomTerm):
-        return WeightedTerm(column, function, setting.weight * seconds, setting.width)
-    return WeightedTerm(column, function, setting * seconds, None)
+        return terms, tracking
 
 
 def kernel(squared_error: Array, width: float | Array) -> Array:
@@ -112,8 +89,7 @@ def kernel(squared_error: Array, width: float | Array) -> Array:
 
 
 def load_terms(recipe: Reward) -> dict[str, Callable[[Step], Array]]:
-    """User-defined terms that have a weight, by dotted path; only training environments execute their file. Raises
-    StageFailed for one that cannot be used."""
+    """Executes the user-defined terms that have a weight, by dotted path; StageFailed for one that cannot be used."""
     return {f"own.{name}": _own_term(f"task.reward.own.{name}", term) for name, term in recipe.own_terms.items()}
 
 

@@ -1,5 +1,4 @@
-"""Formulas of the reward's terms (paper III-D) that are longer than a line of the table: functions of arrays over n
-environments."""
+"""Formulas of the reward's terms (paper III-D) that are longer than a line of the table, over n environments."""
 
 import numpy as np
 
@@ -73,8 +72,7 @@ def swing_height(sole_height: Array, profile: Array, swinging: Mask) -> Array:
 
 
 def foot_slip(foot_velocity: Array, foot_force: Array) -> Array:
-    """Load-weighted mean of the soles' horizontal speeds, (n,) [m/s]; velocities and forces (n, 2, 3), in m/s and N.
-    Zero in the air."""
+    """Load-weighted mean of the soles' horizontal speeds, (n,) [m/s], zero in the air; (n, 2, 3) in m/s and N."""
     load = np.maximum(foot_force[:, :, 2], 0.0)
     speed = np.sqrt(np.vecdot(foot_velocity[:, :, :2], foot_velocity[:, :, :2]))
     return np.vecdot(speed, load) / np.maximum(load.sum(axis=1), LEAST_LOAD)

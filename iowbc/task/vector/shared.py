@@ -6,7 +6,6 @@ The memory is anonymous, so that nothing is left behind when a process dies.
 import mmap
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,17 +18,11 @@ Fields = Mapping[str, tuple[tuple[int, ...], str]]
 """Shape of one environment's part and dtype, by name."""
 
 
-@dataclass(frozen=True)
-class Buffers:
-    """Arrays that an environment batch reads and writes in each step; rows are environments."""
-
-    arrays: dict[str, NDArray[Any]]
-
-    def __getitem__(self, name: str) -> NDArray[Any]:
-        return self.arrays[name]
+class Buffers(dict[str, NDArray[Any]]):
+    """Arrays that an environment batch reads and writes in each step, by name; rows are environments."""
 
     def rows(self, first: int, last: int) -> "Buffers":
-        return Buffers({name: array[first:last] for name, array in self.arrays.items()})
+        return Buffers({name: array[first:last] for name, array in self.items()})
 
 
 def private_buffers(fields: Fields, rows: int) -> Buffers:
@@ -38,8 +31,7 @@ def private_buffers(fields: Fields, rows: int) -> Buffers:
 
 
 def create_shared(fields: Fields, rows: int) -> tuple[int, Buffers]:
-    """Shared buffers and the file descriptor that a worker inherits. The memory has no name in the file system and is
-    freed with its last holder."""
+    """Shared buffers and the file descriptor that a worker inherits. The memory is freed with its last holder."""
     descriptor = os.memfd_create("iowbc-buffers", os.MFD_CLOEXEC)
     os.ftruncate(descriptor, _place(fields, rows)[1])
     return descriptor, attach_shared(descriptor, fields, rows)
@@ -49,12 +41,10 @@ def attach_shared(descriptor: int, fields: Fields, rows: int) -> Buffers:
     """The buffers behind a file descriptor made by `create_shared` with the same fields and rows."""
     offsets, size = _place(fields, rows)
     memory = mmap.mmap(descriptor, size)
-    return Buffers(
-        {
-            name: np.ndarray((rows, *shape), dtype, buffer=memory, offset=offsets[name])
-            for name, (shape, dtype) in fields.items()
-        }
-    )
+    buffers = Buffers()
+    for name, (shape, dtype) in fields.items():
+        buffers[name] = np.ndarray((rows, *shape), dtype, buffer=memory, offset=offsets[name])
+    return buffers
 
 
 def _place(fields: Fields, rows: int) -> tuple[dict[str, int], int]:

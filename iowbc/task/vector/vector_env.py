@@ -68,9 +68,7 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
             self.workers = WorkerProcesses(self.setup, workers, patience) if workers else InProcess(self.setup)
         self._buffers = self.workers.buffers
         self.signals: dict[str, Array] = {
-            name.removeprefix("signal/"): values
-            for name, values in self._buffers.arrays.items()
-            if name.startswith("signal/")
+            name.removeprefix("signal/"): values for name, values in self._buffers.items() if name.startswith("signal/")
         }
         """Values of the last step, before an automatic reset, (num_envs, k); see `iowbc.task.record.signals`."""
         self.period = 1.0 / recipe.task.control_frequency
@@ -97,7 +95,7 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
         """Starts an episode in every environment; after a call of `seed`, with those seeds."""
         seeds = None if self._seeds[0] is None else np.array(self._seeds, np.uint64)
         parts = [None if seeds is None else seeds[first:last] for first, last in self.workers.groups]
-        self._call([Message.of(Batch.reset, part) for part in parts])
+        self._call([Message(Batch.reset, (part,)) for part in parts])
         self._reset_seeds()
         self._reset_options()
         return self._buffers["observation"].copy()
@@ -111,7 +109,7 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
             rows = np.flatnonzero(~np.isfinite(given).all(axis=1))
             raise ValueError(f"actions of environments {rows.tolist()} are not finite, the first is {given[rows[0]]}")
         self._buffers["action"][:] = given
-        self.workers.ask([Message.of(Batch.step) for _ in self.workers.groups])
+        self.workers.ask([Message(Batch.step) for _ in self.workers.groups])
 
     def step_wait(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
         """Results of the step: observations, rewards, dones, infos; ended environments have been reset."""
@@ -124,9 +122,8 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
         return buffers["observation"].copy(), buffers["reward"].copy(), done, infos
 
     def roll(self, rollout_policy: RolloutPolicy, steps: int) -> Trajectories:
-        """Runs a rollout of some control steps in the workers, with one message to each and one back. The result does
-        not depend on the number of workers."""
-        messages = [Message.of(roll, rollout_policy.part(*group), steps) for group in self.workers.groups]
+        """Runs a rollout of some control steps, with one message to each worker; the same whatever their number."""
+        messages = [Message(roll, (rollout_policy.part(*group), steps)) for group in self.workers.groups]
         return side_by_side(self._call(messages))
 
     def _ending(self, index: int) -> dict[str, Any]:
@@ -183,7 +180,7 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
         own = dict(state)
         self._statistics.carried[:] = own.pop("statistics")
         parts = split(own, [self._scenes[first:last] for first, last in self.workers.groups])
-        self._call([Message.of(Batch.restore, part) for part in parts])
+        self._call([Message(Batch.restore, (part,)) for part in parts])
         self._reset_seeds()
 
     def close(self) -> None:
@@ -234,7 +231,7 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
 
     def _set_levels(self, levels: Array) -> None:
         parts = [levels[first:last] for first, last in self.workers.groups]
-        self._call([Message.of(Batch.set_levels, part) for part in parts])
+        self._call([Message(Batch.set_levels, (part,)) for part in parts])
 
     def _levels(self) -> Array:
         return np.concatenate(self._read(Batch.levels))

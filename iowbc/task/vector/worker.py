@@ -11,7 +11,7 @@ import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
-from typing import Any, Self, TypeVarTuple
+from typing import Any
 
 from iowbc.errors import IowbcError
 from iowbc.processes import die_with_parent
@@ -19,8 +19,6 @@ from iowbc.processes import die_with_parent
 ASKED = "import json, sys; sys.path[:] = json.loads(sys.argv.pop(1)); from iowbc.task.vector.worker import main; main()"
 """Python program of a worker process. Its arguments are the parent's module path, as JSON, and its process id; whether
 to die with the thread that started the worker; and the descriptors of pipe, shared memory and log."""
-
-Given = TypeVarTuple("Given")
 
 
 @dataclass(frozen=True)
@@ -31,11 +29,6 @@ class Message:
     arguments: tuple[Any, ...] = ()
     changes: bool = True
     """True if the call changes the environments' state."""
-
-    @classmethod
-    def of(cls, method: Callable[[Any, *Given], Any], *arguments: *Given) -> Self:
-        """A call that changes the environments, of a method of their class."""
-        return cls(method, arguments)
 
     def carry_out(self, batch: Any) -> Any:
         """Executes the call for a group of environments."""
