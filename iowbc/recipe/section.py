@@ -9,15 +9,7 @@ import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    ConfigDict,
-    Field,
-    GetJsonSchemaHandler,
-    PositiveFloat,
-    model_validator,
-)
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, GetJsonSchemaHandler, PositiveFloat, model_validator
 from pydantic.fields import FieldInfo
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
@@ -72,8 +64,7 @@ class Section(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
     withdrawn: ClassVar[Mapping[str, Any]] = {}
-    """Fields of an earlier version that entered no key, with the value whose behaviour remains; resolved recipes of
-    artifacts still give that value."""
+    """Fields of an earlier version that entered no key, with the only value that resolved recipes may still give."""
     withdrawn_from_key: ClassVar[Mapping[str, Any]] = {}
     """The same for fields that entered the key, which still contains the value."""
 
@@ -176,22 +167,17 @@ class Encoder(Section):
 def sentences(section: type[BaseModel]) -> dict[str, str]:
     """Attribute docstrings of a section and its bases, by field name.
 
-    They are read on demand: pydantic's `use_attribute_docstrings` reads every section's source whenever a command
-    starts.
+    Read on demand: pydantic's `use_attribute_docstrings` reads every section's source whenever a command starts.
     """
     bases = [base for base in section.__bases__ if issubclass(base, BaseModel) and base is not BaseModel]
     (definition,) = ast.parse(textwrap.dedent(inspect.getsource(section))).body
     assert isinstance(definition, ast.ClassDef)
-    own = {
-        field.target.id: inspect.cleandoc(text.value.value)
-        for field, text in itertools.pairwise(definition.body)
-        if isinstance(field, ast.AnnAssign)
-        and isinstance(field.target, ast.Name)
-        and isinstance(text, ast.Expr)
-        and isinstance(text.value, ast.Constant)
-        and isinstance(text.value.value, str)
-    }
-    return {name: sentence for base in bases for name, sentence in sentences(base).items()} | own
+    found = {name: sentence for base in bases for name, sentence in sentences(base).items()}
+    for pair in itertools.pairwise(definition.body):
+        match pair:
+            case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(value=ast.Constant(value=str(text))):
+                found[name] = inspect.cleandoc(text)
+    return found
 
 
 class InconsistentValues(ValueError):
@@ -203,8 +189,7 @@ class InconsistentValues(ValueError):
 
 
 def deciding(section: Section) -> dict[str, Any]:
-    """The values of a section that enter its key, as JSON data. At every depth, COSMETIC fields, LATER fields at their
-    default and idle entries are left out."""
+    """Values of a section's key, as JSON data: no COSMETIC fields, LATER fields at their default, or idle entries."""
     return _deciding(section, section.model_dump(mode="json"))
 
 

@@ -79,5 +79,4 @@ class ModelBased(Section):
     """Fraction of a linkage's torque available to either of its two joints alone. Otherwise a waist that pitches under
     a load would have no roll torque left against falling sideways."""
     stop_torque: NonNegative = 60.0
-    """Torque that a joint's mechanical stop may bear when the joint rests on it [N·m]. A waist that pitches forward
-    with a load needs it in addition to its motors."""
+    """Torque that a mechanical stop may bear when its joint rests on it, as the waist's under a load [N·m]."""

@@ -51,8 +51,7 @@ class MassSweep(Section):
     """Rolling resistance μ of the crate's wheels; empty: drawn as in training."""
     partner_shares: tuple[PartnerShare, ...] = Field(default=(0.0, 0.5), min_length=1)
     """Nominal fractions of the weight (in pushing, of the rolling resistance) that the partner bears, besides the
-    spring and damper of its hands; the sweep runs once for each. Negative: the partner resists; 0: the robot bears all;
-    empty: drawn as in training."""
+    spring and damper of its hands; a sweep for each. Negative: it resists; 0: none; empty: drawn as in training."""
     with_share: tuple[ShareOverride, ...] = ()
     """Other masses, or another rolling resistance, for some of these shares."""
     fixed: Held = Field(default_factory=dict)
@@ -102,21 +101,15 @@ class HeavyCase(Case):
     """Fraction of the load that the partner bears, as in a sweep; half by default, since two carry these objects."""
 
 
+BLOCKED = Case(name="blocked crate", scene="push", mass=65.0, fixed={"resistance_scale": 50.0}, sequence=STAGNATION)
+"""Push against a crate that does not move."""
+
+
 class Stagnation(Section):
-    """Infeasible pushes (paper IV-D). Success: continued pushing in the commanded posture, on feet that do not slide;
-    E_v is expected to be large."""
+    """Infeasible pushes (paper IV-D). Success: continued pushing in the commanded posture, without sliding feet."""
 
     cases: tuple[Case, ...] = Field(
-        default=(
-            Case(
-                name="blocked crate",
-                scene="push",
-                mass=65.0,
-                fixed={"resistance_scale": 50.0, "ground_friction": 0.5},
-                sequence=STAGNATION,
-            ),
-        ),
-        min_length=1,
+        default=(BLOCKED.model_copy(update={"fixed": BLOCKED.fixed | {"ground_friction": 0.5}}),), min_length=1
     )
     """Cases of the suite. By default, a 65 kg crate with fifty times its rolling resistance resists with 638 N or more,
     whereas foot friction of 0.5, the smallest of training, allows 164 N. With higher friction, a robot in the commanded
@@ -130,8 +123,7 @@ EIGHT: tuple[Direction, ...] = get_args(Direction)
 
 
 class PushLadder(Section):
-    """Pushes on the base with increasing impulse until the robot falls. They measure the impulse survived in each
-    direction; the robot must walk afterwards."""
+    """Pushes on the base with increasing impulse until the robot falls, in each direction; it must walk afterwards."""
 
     scene: ObjectScene = "lift"
     """Scene of `simulation.scenes`."""
@@ -211,16 +203,14 @@ class Probe(Section):
     scene: ObjectScene = "lift"
     """Scene of `simulation.scenes`, with an object."""
     masses: tuple[PositiveFloat, PositiveFloat] = (1.0, 10.0)
-    """Lightest and heaviest object [kg]; the trials' masses are spread evenly between them. The default is the range of
-    box masses in training."""
+    """Lightest and heaviest object [kg], with masses spread evenly between them; by default the boxes of training."""
     trials: int = Field(default=180, ge=20, le=2000)
     """Number of trials, each with its own mass and seed. Each trial draws some 70 random quantities: a regression on
     fewer trials than that cannot distinguish the mass from the others."""
     seed: int = Field(default=9000, ge=0, lt=2**32)
     """Seed of the first trial; distinct from those of training, its checks, evaluation and export."""
     partner_share: PartnerShare = 0.0
-    """Fraction of the weight that a partner bears, as in a sweep. It is zero by default, because the hands feel only
-    the remaining weight."""
+    """Fraction of the weight that a partner bears, as in a sweep; hands feel only the remaining weight."""
     fixed: Held = Field(default_factory=dict)
     """Fixed values of other randomized quantities, by name."""
     sequence: tuple[Segment, ...] = Field(default=PROBED, min_length=1)
@@ -258,8 +248,7 @@ class Impedance(Section):
 
 
 class Compliance(Section):
-    """Partners of different behaviour, a blocked crate, and sinusoidal pulls; without random impulses and pushes, so
-    that all forces are interaction forces."""
+    """Partners of different behaviour, a blocked crate, and sinusoidal pulls; without random impulses and pushes."""
 
     scene: ObjectScene = "lift"
     """Scene of `simulation.scenes`, with an object that is held."""
@@ -273,9 +262,7 @@ class Compliance(Section):
     """Trials of each case; empty: `eval.trials`."""
     sequence: tuple[Segment, ...] = ()
     """Commands; empty: those of the sweeps."""
-    blocked: Case | None = Case(
-        name="blocked crate", scene="push", mass=65.0, fixed={"resistance_scale": 50.0}, sequence=STAGNATION
-    )
+    blocked: Case | None = BLOCKED
     """Push against an immovable crate; empty: none."""
     impedance: Impedance | None = Impedance()
     """Sinusoidal pulls; empty: none."""

@@ -36,8 +36,7 @@ class Curriculum(Section):
 
     Each environment has a level between 0 and 2 on each of four axes: posture, locomotion, load, disturbance. A level
     rises after an episode that survives and succeeds by the axis' own criterion, and falls after an early end that is
-    attributed to the axis. With a single level for all axes, robots that could not walk yet received heavier loads and
-    stronger pushes before they practised a step.
+    attributed to the axis. With one level for all axes, robots that could not walk yet received ever heavier loads.
     """
 
     enabled: bool = True
@@ -52,8 +51,7 @@ class Curriculum(Section):
     posture: Scale = Scale(start=0.2, full=1.0, extreme=1.0)
     """Factor on the ranges of height, pitch and wrist offsets, around the nominal posture."""
     load: Scale = Scale(start=0.15, full=1.0, extreme=1.3)
-    """Upper end of the mass range, relative to the scene's own; the lower end is constant. At 1.3 the box weighs up to
-    13.5 kg, and shoulders hold 12 to 16."""
+    """Upper end of the mass range, relative to the scene's own. At 1.3 the box has 13.5 kg; shoulders hold 12 to 16."""
     resistance: Scale = Scale(start=0.5, full=1.0, extreme=3.0)
     """Factor on a crate's rolling resistance at each level of load; at 3 it is near the limit of foot friction."""
     blocked: Scale = Scale(start=0.0, full=0.0, extreme=0.25)
@@ -65,8 +63,7 @@ class Curriculum(Section):
     disturbance: Scale = Scale(start=0.0, full=1.0, extreme=1.5)
     """Factor on impulses and pushes."""
     balance: Ceilings = Ceilings(posture=1.0, locomotion=0.5, load=1.0, disturbance=0.3)
-    """Phase 1: static balance under varied loads. Slow walking, which takes longest to learn, is practised from the
-    start."""
+    """Phase 1: static balance under varied loads, with slow walking, which takes longest to learn."""
     locomotion: Ceilings = Ceilings(posture=1.0, locomotion=1.0, load=1.0, disturbance=1.0)
     """Phase 2: locomotion with impulses; an environment enters it when it has reached all ceilings of phase 1."""
     extreme: Ceilings = Ceilings(posture=2.0, locomotion=2.0, load=2.0, disturbance=2.0)
@@ -82,8 +79,7 @@ class Curriculum(Section):
     early: float = Field(default=0.7, gt=0.0, le=1.0)
     """Fraction of the time limit before which an end counts as a failure."""
     tracking: float = Field(default=0.65, ge=0.0, le=1.0)
-    """Smallest mean score of height and of pitch, by the kernels of their reward terms, for a success of posture, load
-    and disturbance."""
+    """Smallest mean score of height and of pitch (reward kernels) for a success of posture, load and disturbance."""
     progress: float = Field(default=0.6, ge=0.0, le=1.0)
     """Smallest fraction of the commanded displacement for a success of locomotion, counted along the command and no
     faster than it. Above level 1, where commands may be infeasible, posture counts instead."""
@@ -93,8 +89,7 @@ class Curriculum(Section):
     heading: float = Field(default=0.5, gt=0.0)
     """Largest mean heading error [rad] for a success of locomotion; it does not count above level 1."""
     lagging: float = Field(default=0.2, ge=0.0, le=1.0)
-    """Fraction of the commanded displacement below which an episode with walking lowers the level of locomotion even
-    without a fall: the robot stepped in place."""
+    """Fraction of the commanded displacement below which a walk lowers the level of locomotion even without a fall."""
     least_walk: float = Field(default=2.0, ge=0.0)
     """Smallest time with a commanded velocity for an episode to affect the level of locomotion [s]."""
     replay: float = Field(default=0.0, ge=0.0, le=1.0, json_schema_extra=LATER)

@@ -28,8 +28,7 @@ class Grasps(NamedEntries):
 
 
 class Loads(NamedEntries):
-    """Loads that the arm references compensate in each scene [kg]; lighter objects raise the hands, heavier ones lower
-    them."""
+    """Loads that the arm references compensate in each scene [kg]; other loads raise or lower the hands."""
 
     __pydantic_extra__: dict[str, Annotated[float, Field(ge=0.0)]] = Field(init=False)
     free: float = Field(default=0.0, ge=0.0)
@@ -58,8 +57,7 @@ class ArmReference(Section):
     damping: float = Field(default=0.05, gt=0.0)
     """Damping of the pseudo-inverse [m]: joint motion is bounded by |Δx| / (2·damping) next to a singular posture."""
     reach: float = Field(default=0.2, ge=0.0)
-    """Squared damping added per metre of error [m]; an arm stretched towards an unreachable target then settles instead
-    of overshooting."""
+    """Squared damping per metre of error [m]: stretched towards an unreachable target, an arm does not overshoot."""
     longest_step: float = Field(default=0.1, gt=0.0)
     """Bound on the error of an iteration [m], so that a wrist approaches a distant target without overshooting."""
     posture_gain: float = Field(default=1.0, ge=0.0)
@@ -79,13 +77,11 @@ class Recovery(Section):
     extrapolated over `horizon`. A quiet robot measures a median of 0.1, and 0.25 in one step of a hundred: up to 0.15
     the clock runs most of the time. At 0.4 steps come too late for 20 N·s."""
     horizon: float = Field(default=0.25, ge=0.0)
-    """Time over which the tilt is extrapolated at the measured rate [s]: sqrt(h / g) of a pelvis at 0.7 m, so that the
-    sum is the capture point's angle."""
+    """Time over which the tilt is extrapolated [s]: sqrt(h / g) of a pelvis at 0.7 m, to the capture point's angle."""
 
 
 class Placement(Section):
-    """Feedback of the estimated forward speed on footholds: a robot that is pushed ahead steps further ahead, and one
-    that lags pushes from further behind."""
+    """Feedback of the estimated forward speed on footholds: a robot that is pushed ahead steps further ahead."""
 
     gain: float = Field(default=0.15, ge=0.0)
     """Forward shift of a foothold per m/s above the commanded speed [s]. The capture point of a 0.7 m pendulum is 0.27
@@ -97,9 +93,8 @@ class Placement(Section):
     return_time: float = Field(default=0.27, gt=0.0)
     """Time constant of a stance foot's return to its nominal place [s]: sqrt(h / g) of a 0.7 m pendulum."""
     integral: float = Field(default=0.0, ge=0.0, json_schema_extra=LATER)
-    """Backward shift of both feet per metre of estimated lag behind the command, so that the robot leans into a push
-    [m/m]. Without it, a 10 kg crate moves at 1.18 and a 60 kg crate at 0.56 of the commanded speed; with 0.05 at 1.07
-    and 0.74."""
+    """Backward shift of both feet per metre of estimated lag behind the command, to lean into a push [m/m]. Without it,
+    a 10 kg crate moves at 1.18 and a 60 kg crate at 0.56 of the commanded speed; with 0.05 at 1.07 and 0.74."""
     longest_trim: float = Field(default=0.1, ge=0.0, json_schema_extra=LATER)
     """Largest shift by `integral` [m]: that for 36 N at hands 0.95 m above the ground and a 35 kg robot. With 0.16,
     policies that were not trained with it fall."""
@@ -136,16 +131,14 @@ class GaitPrior(Section):
     frequency: float = Field(default=1.35, gt=0.0)
     """Stride frequency [Hz]."""
     stance: float = Field(default=0.58, gt=0.5, lt=1.0)
-    """Duty factor: fraction of the stride in which a foot is on the ground; above one half there are two double-support
-    phases per stride."""
+    """Duty factor: fraction of the stride with a foot on the ground; above one half there is double support."""
     stride: float = Field(default=1.0, ge=0.0)
     """Fraction of the commanded velocity and yaw rate at which stance feet move under the pelvis: at 1 the reference
     walks as commanded and the policy only corrects it, at 0 it steps in place."""
     swing_clearance: float = Field(default=0.08, gt=0.0)
     """Height of the sole at mid-swing [m], also in the reward's profile."""
     profile: Literal["sine", "rest"] = Field(default="sine", json_schema_extra=LATER)
-    """Height over the swing: clearance·sin(π·progress), which lands at 0.81 m/s, or clearance·sin²(π·progress), which
-    lifts off and lands at rest."""
+    """Height over the swing: clearance·sin(π·progress), landing at 0.81 m/s, or ·sin²(π·progress), landing at rest."""
     sway: float = Field(default=0.02, ge=0.0)
     """Amplitude of the pelvis' lateral motion over the stance foot [m]. A 0.7 m pendulum that steps from side to side
     every 0.37 s, between feet 0.24 m apart, sways by 0.022 m."""

@@ -102,8 +102,7 @@ class GaitConstraint(Section):
     """Weight of the sliding speed of the soles, averaged with the load of each as weight [m/s]. With squared speeds, a
     slide of 0.1 m/s cost almost nothing, and walking feet slid 0.3 m per metre."""
     touchdown: float = Field(default=0.0, json_schema_extra=LATER)
-    """Weight of the squared downward velocity of both soles near the ground [m²/s²], which fades with their height over
-    `touchdown_height`."""
+    """Weight of the squared downward velocity of both soles [m²/s²], which fades over `touchdown_height`."""
     touchdown_height: float = Field(default=0.02, gt=0.0, json_schema_extra=LATER)
     """Height of a sole at which `touchdown` counts 37 % [m]."""
     standing: float = -1.0
@@ -121,8 +120,7 @@ class Yielding(Section):
     """Compliance to horizontal forces on the hands: of a partner, impulses, or a blocked crate.
 
     By default v_coll is tracked regardless of the force, as in the paper. With a damping b, velocity terms and
-    curriculum track v_coll + F/b, where F is the horizontal force of the object on the hands beyond what the transport
-    needs.
+    curriculum track v_coll + F/b; F: horizontal force of the object on the hands beyond what the transport needs.
     """
 
     held: float | None = Field(default=None, gt=0.0)
@@ -163,8 +161,7 @@ class Later(Section):
     end: float = Field(default=0.9, ge=0.0, le=2.0)
     """Level from which the later weights apply; weights are interpolated between the two levels."""
     weights: dict[str, float] = Field(default_factory=dict)
-    """Later weight by the dotted path of a term in `task.reward`, such as `sync.progress`, which teaches walking but
-    makes a robot that walks hurry."""
+    """Later weight by a term's dotted path in `task.reward`, such as `sync.progress`, which makes walkers hurry."""
 
     def problems(self) -> Iterator[tuple[str, str]]:
         if self.begin >= self.end:
