@@ -20,8 +20,7 @@ class SafetyLimits(Section):
     """Limits of checks and watchdogs."""
 
     state_age: float = Field(default=0.015, gt=0.0)
-    """Age of the newest state at which it is stale [s]: seven lost messages at 500 Hz; with the loop's period, damping
-    begins within 20 ms of the last state."""
+    """Age of the newest state at which it is stale [s]: seven lost messages at 500 Hz; damping begins within 20 ms."""
     frozen: float = Field(default=0.05, gt=0.0)
     """Time for which the inertial unit, or all motors, may repeat their values [s]: sensors have noise, and 25 states
     allow for a board that updates them more slowly."""
@@ -186,15 +185,3 @@ def beyond(now: MeasuredState, contract: Contract, limits: SafetyLimits) -> str 
         if excess[joint := int(np.argmax(excess))] > 0.0:
             return f"{name} limit: {contract.joints[joint]} at {value[joint]:.2f} {unit}"
     return None
-
-
-def exhausted(
-    now: MeasuredState, charge: float | None, joints: tuple[str, ...], least: float, most: float
-) -> dict[str, str]:
-    """Messages about a battery below `least` [%] and a motor above `most` [°C]; `charge`: None if unknown [%]."""
-    found = {}
-    if charge is not None and charge < least:
-        found["battery"] = f"battery at {charge:.0f} %, less than {least:g}"
-    if now.temperature[hottest := int(np.argmax(now.temperature))] > most:
-        found["temperature"] = f"temperature: {joints[hottest]} at {now.temperature[hottest]:.0f} °C, above {most:g}"
-    return found
