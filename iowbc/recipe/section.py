@@ -19,8 +19,7 @@ from iowbc.errors import shown
 COSMETIC: dict[str, Any] = {"cosmetic": True}
 """Marks a field that changes how a stage is run or shown, but none of its results; it is not part of the key."""
 LATER: dict[str, Any] = {"later": True}
-"""Marks a field that was added after artifacts were published. Its default is the earlier behaviour and is not part of
-the key, so that the keys of those artifacts stay valid."""
+"""Marks a field added after artifacts were published: its default, the earlier behaviour, is not part of the key."""
 
 
 def in_order(ends: tuple[float, float]) -> tuple[float, float]:
@@ -120,10 +119,7 @@ class Interval(Section):
 
 
 class NamedEntries(Section):
-    """Mapping of names to entries of one type: built-in entries are fields, and a recipe may add custom ones.
-
-    The type of custom entries is the annotation of `__pydantic_extra__`.
-    """
+    """Mapping of names to entries: fields, and custom ones of the type that annotates `__pydantic_extra__`."""
 
     model_config = ConfigDict(extra="allow")
 

@@ -50,8 +50,7 @@ class Check(Section):
     """Errors E_α [rad], E_h [m], E_v [m/s] and E_ψ [rad] that halve their part of the score; by default the paper's
     IO-WBC without a load (Table II). Errors far below their scale have little effect."""
     fall: float = Field(default=1.0, ge=0, le=1, json_schema_extra=LATER)
-    """Factor on the score of a trial that is not survived. At 1 a fall in the last of twenty seconds costs a twentieth,
-    less than slightly better velocity tracking gains."""
+    """Factor on the score of a trial that is not survived; at 1, a late fall costs less than better tracking gains."""
     collapse: float = Field(default=1 / 3, gt=0, lt=1)
     """Relative loss of the best score that counts as a collapse; training then returns to the best policy."""
     notable: float = Field(default=0.4, ge=0, lt=1)

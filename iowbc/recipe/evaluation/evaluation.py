@@ -32,8 +32,7 @@ class Drake(Section):
     dissipation: float = Field(default=2.0, ge=0.0)
     """Hunt-Crossley dissipation of a contact [s/m]."""
     stiction: float = Field(default=1e-3, gt=0.0)
-    """Speed below which friction is regularized, for sliding contacts and crates [m/s] and for joints [rad/s]. At its
-    friction limit a crate at rest creeps at this speed, as in MuJoCo."""
+    """Speed below which friction is regularized [m/s, rad/s]; crates at their friction limit creep at it."""
 
 
 class Success(Section):
@@ -49,8 +48,7 @@ class Success(Section):
     weight_in_hands: float = Field(default=0.95, ge=0, le=1)
     """Fraction of a held object's weight, less other vertical forces, that must rest in the hands on average."""
     least_weight: float = Field(default=5.0, ge=0)
-    """Weight, less the partner's nominal share, below which `weight_in_hands` is not evaluated [N]. A 0.05 kg box
-    weighs a tenth of this, and a touch of the torso is several times its weight."""
+    """Weight, less the partner's nominal share, below which `weight_in_hands` is not evaluated [N]."""
     object_beside: float = Field(default=0.35, gt=0, json_schema_extra=LATER)
     """Lateral distance from the robot beyond which a pushed object counts as lost [m]: the midpoint of the hands is
     then past the edge of a 0.6 m wide crate. For a held object see `object_distance`."""
@@ -70,8 +68,7 @@ class Success(Section):
     least_push: float = Field(default=20.0, ge=0)
     """Smallest mean force of both hands during steps, for success in a compliance trial with a blocked crate [N]."""
     compliance_transport: float = Field(default=0.25, ge=0, le=1)
-    """Fraction of the commanded displacement that robot and object must cover in a compliance trial: half of
-    `transport`, because the partner stops, lags and deviates."""
+    """Fraction of the displacement to cover in a compliance trial: half of `transport`, as the partner deviates."""
     posture_pitch: float = Field(default=0.3, gt=0)
     """Largest mean torso pitch error for success in an infeasible push [rad]; twice the paper's E_α."""
     posture_height: float = Field(default=0.05, gt=0)

@@ -34,15 +34,13 @@ class Estimation(Section):
     model_error: Positive = 3.0
     """Standard deviation of the error of the planned acceleration in a control period [rad/s²]."""
     load_drift: Positive = 5.0
-    """Random walk of the steady error of the planned acceleration, such as that due to a load [rad/s² per √s]. The
-    filter accounts for this error, the program does not."""
+    """Random walk of the steady error of the planned acceleration, such as that due to a load [rad/s² per √s]."""
 
 
 class ModelBased(Section):
     """A whole-body quadratic program that stands, crouches and leans on both feet; it does not walk.
 
-    Its model is the nominal robot without a load. It sees the same observation as the student and acts through the same
-    joint controllers.
+    Its model is the nominal robot without a load. It observes and acts as the student does.
     """
 
     com: Tracking = Tracking(weight=100.0, stiffness=40.0, damping=10.0)
@@ -51,8 +49,7 @@ class ModelBased(Section):
     height: Tracking = Tracking(weight=100.0, stiffness=80.0, damping=14.0)
     """Height of the pelvis. With a lower weight than the centre of mass, the robot sinks to hold the torso up."""
     torso: Tracking = Tracking(weight=5.0, stiffness=250.0, damping=29.0)
-    """Orientation of the torso: commanded pitch, zero roll, mean yaw of the soles. The stiffness is high because the
-    load in the hands, which the model lacks, bends the torso."""
+    """Torso: commanded pitch, zero roll, mean yaw of the soles; stiff, because the model lacks the load."""
     posture: Tracking = Tracking(weight=0.4, stiffness=44.0, damping=12.0)
     """Support joints, towards the same reference θ_S_ref that the learnt policies correct."""
     torque_weight: Positive = 1e-3

@@ -1,5 +1,4 @@
-"""Suites of trials: mass sweeps, single cases, pushes of increasing impulse, a map of pushes, a probe of the history,
-and interaction with partners."""
+"""Suites of trials: mass sweeps, single cases, pushes, a probe of the history, and interaction with partners."""
 
 from collections.abc import Iterator
 from typing import Annotated, Literal, get_args
@@ -195,10 +194,8 @@ class PushMap(Section):
 
 
 class Probe(Section):
-    """Linear regression of the object's mass on the policy's observations, in trials with evenly spread masses.
-
-    Trials alternate between training and test set, so that no tested mass was trained on.
-    """
+    """Linear regression of the object's mass on the policy's observations; alternate trials are its training and test
+    set."""
 
     scene: ObjectScene = "lift"
     """Scene of `simulation.scenes`, with an object."""
@@ -224,8 +221,7 @@ class Probe(Section):
 
 
 class Impedance(Section):
-    """Sinusoidal forces on the centre of mass of a held object; its motion yields the mechanical impedance. The robot
-    stands and holds the object alone; afterwards it must walk."""
+    """Sinusoidal forces on an object that a standing robot holds, to measure its impedance; afterwards it must walk."""
 
     scene: ObjectScene = "lift"
     """Scene of `simulation.scenes`."""

@@ -119,8 +119,7 @@ class PartnerSettings(Section):
     noise: Distribution = Distribution(low=0.0, high=8.0, nominal=0.0)
     """Standard deviation of the partner's random force, per horizontal axis [N]."""
     noise_resistance: float = Field(default=40.0, gt=0.0)
-    """Rolling resistance at which the random force is as large in a push as in a lift [N]; the force in a push is
-    proportional to the resistance. The default is that of the nominal crate."""
+    """Rolling resistance at which the random force, proportional to it in a push, is that of a lift [N]."""
     noise_time: float = Field(default=0.5, gt=0.0)
     """Correlation time of the random force [s]."""
     leash: float = Field(default=0.15, gt=0.0)

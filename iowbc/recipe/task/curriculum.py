@@ -44,8 +44,7 @@ class Curriculum(Section):
     fixed_level: float = Field(default=1.0, ge=0.0, le=2.0)
     """Level of all axes without a curriculum, in evaluation and in single environments. 1: the recipe's own ranges."""
     velocity: Scale = Scale(start=1.0, full=1.0, extreme=1.3)
-    """Factor on the range of v_x at each level of locomotion; by default the full range from the start. At 0.6, a robot
-    that steps in place tracks the command so closely that it hardly learns to walk."""
+    """Factor on the range of v_x at each level of locomotion. Starting at 0.6, robots hardly learnt to walk."""
     turning: Scale = Scale(start=0.2, full=1.0, extreme=1.3)
     """Factor on the ranges of v_y and yaw rate at each level of locomotion: straight walking is learnt first."""
     posture: Scale = Scale(start=0.2, full=1.0, extreme=1.0)
@@ -58,8 +57,7 @@ class Curriculum(Section):
     """Fraction of the pushes with a blocked crate at each level of load. Together with `resistance`, more than 30 % of
     the pushes at level 2 are infeasible: they teach the robot to stay upright against an immovable crate."""
     blocking: float = Field(default=50.0, ge=1.0, json_schema_extra=LATER)
-    """Factor on the rolling resistance of a blocked crate. At the nominal resistance of 0.06, a 13 kg crate resists
-    with 392 N, the most that feet hold, and heavier ones do not move."""
+    """Factor on the rolling resistance of a blocked crate; at the nominal 0.06, crates of 13 kg or more do not move."""
     disturbance: Scale = Scale(start=0.0, full=1.0, extreme=1.5)
     """Factor on impulses and pushes."""
     balance: Ceilings = Ceilings(posture=1.0, locomotion=0.5, load=1.0, disturbance=0.3)

@@ -96,17 +96,14 @@ class Placement(Section):
     """Backward shift of both feet per metre of estimated lag behind the command, to lean into a push [m/m]. Without it,
     a 10 kg crate moves at 1.18 and a 60 kg crate at 0.56 of the commanded speed; with 0.05 at 1.07 and 0.74."""
     longest_trim: float = Field(default=0.1, ge=0.0, json_schema_extra=LATER)
-    """Largest shift by `integral` [m]: that for 36 N at hands 0.95 m above the ground and a 35 kg robot. With 0.16,
-    policies that were not trained with it fall."""
+    """Largest shift by `integral` [m]: that for 36 N at hands 0.95 m above the ground and a 35 kg robot."""
 
 
 class TorsoFeedback(Section):
-    """Feedback of the torso's pitch on both hips, which relieve the waist's motors: these give 35 to 50 N·m, and 8 kg
-    in the hands need 54 in a bow of 0.4 rad."""
+    """Feedback of the torso's pitch on both hips, to relieve the waist's 35 to 50 N·m: a bow with 8 kg needs 54."""
 
     integral: float = Field(default=0.1, ge=0.0)
-    """Hip rotation rate per radian by which the torso leans further than commanded [1/s]. At 0.3, a policy that was not
-    trained with it fails a few more lifts of 4 kg."""
+    """Hip rotation rate per radian by which the torso leans further than commanded [1/s]."""
     furthest: float = Field(default=0.15, ge=0.0)
     """Largest backward rotation of the pelvis by the hips [rad]; without it a robot with 8 kg leans 0.2 further."""
     least: float = Field(default=0.05, ge=0.0)
@@ -114,8 +111,7 @@ class TorsoFeedback(Section):
 
 
 class HeightFeedback(Section):
-    """Feedback of the estimated height on the legs, which extend if robot and load bend the knees. Without it, the
-    pelvis of an expert is 2 cm too low with 4 kg, and 4 cm with 8 kg."""
+    """Feedback of the estimated height on the legs, which load bends: by 2 cm with 4 kg and 4 cm with 8 kg."""
 
     integral: float = Field(default=0.5, ge=0.0)
     """Extension rate of both legs per metre by which the pelvis is too low [1/s]."""
@@ -140,14 +136,12 @@ class GaitPrior(Section):
     profile: Literal["sine", "rest"] = Field(default="sine", json_schema_extra=LATER)
     """Height over the swing: clearance·sin(π·progress), landing at 0.81 m/s, or ·sin²(π·progress), landing at rest."""
     sway: float = Field(default=0.02, ge=0.0)
-    """Amplitude of the pelvis' lateral motion over the stance foot [m]. A 0.7 m pendulum that steps from side to side
-    every 0.37 s, between feet 0.24 m apart, sways by 0.022 m."""
+    """Amplitude of the pelvis' lateral motion over the stance foot [m]; a 0.7 m pendulum would sway by 0.022 m."""
     spread: float = Field(default=0.0, ge=0.0, le=0.1, json_schema_extra=LATER)
     """Outward shift of each foot relative to the support posture, standing and walking [m]. `compliant_quick` survives
     215 of 240 disturbed trials with 0.04 and 200 without, but pushes 60 kg at two thirds of the pace."""
     straightest_knee: float = Field(default=0.1, gt=0.0)
-    """Smallest knee flexion, which limits the length of a stride [rad]; closer to the straight leg, millimetres of
-    reach are tenths of a radian."""
+    """Smallest knee flexion [rad]; closer to the straight leg, millimetres of reach are tenths of a radian."""
     moving_speed: float = Field(default=0.05, gt=0.0)
     """Commanded planar speed above which the clock runs [m/s]."""
     moving_yaw_rate: float = Field(default=0.1, gt=0.0)
@@ -178,8 +172,7 @@ class References(Section):
     """Torso pitch to which commands are clamped, within the feasible map [rad]. The map contains all commands with a
     support posture in equilibrium; a policy may achieve less. Empty: only the map clamps."""
     upright: bool = Field(default=False, json_schema_extra=LATER)
-    """Ignore commanded height and pitch in the references. This is for controllers that take velocities only: their
-    torso does not follow, and the arms would reach to the wrong place."""
+    """Ignore commanded height and pitch in the references, for controllers that take velocities only."""
     arms: ArmReference = ArmReference()
     """Arm references."""
     gait: GaitPrior = GaitPrior()

@@ -124,8 +124,7 @@ class Yielding(Section):
     """
 
     held: float | None = Field(default=None, gt=0.0)
-    """Damping b of a held object [N·s/m]; empty: infinite, as in the paper. At 60 a robot commanded to move at 0.5 m/s
-    stays with a partner that stands still at a force of 40 N."""
+    """Damping b of a held object [N·s/m]; empty: infinite, as in the paper. At 60, 0.5 m/s are given up at 40 N."""
     pushed: float | None = Field(default=None, gt=0.0)
     """Damping b of a pushed crate [N·s/m]; empty: infinite. At 280 a robot leans on a blocked crate with 75 N per hand
     at a command of 0.5 m/s: over half of what the friction of its feet allows, and under 90 N."""
