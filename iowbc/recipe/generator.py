@@ -160,8 +160,7 @@ class FeasibleRegion(Section):
     pitches: int = Field(default=41, ge=3, le=1000)
     """Grid points over the pitch range."""
     jump: Positive = 0.055
-    """Largest joint motion of the network per step of height or pitch (`fit.smoothness`) in the map [rad]. It excludes
-    commands near straight legs and joint limits, where the reference jumps."""
+    """Largest joint motion of the network per step (`fit.smoothness`) [rad]; the reference jumps near straight legs."""
     gentle_share: Share = 0.98
     """Fraction of the arm postures for which `jump` must hold at a command."""
     arms: int = Field(default=200, ge=1, le=100_000)

@@ -202,8 +202,7 @@ class Probe(Section):
     masses: tuple[PositiveFloat, PositiveFloat] = (1.0, 10.0)
     """Lightest and heaviest object [kg], with masses spread evenly between them; by default the boxes of training."""
     trials: int = Field(default=180, ge=20, le=2000)
-    """Number of trials, each with its own mass and seed. Each trial draws some 70 random quantities: a regression on
-    fewer trials than that cannot distinguish the mass from the others."""
+    """Number of trials, each with its own mass and seed: more than the 70 random quantities that each draws."""
     seed: int = Field(default=9000, ge=0, lt=2**32)
     """Seed of the first trial; distinct from those of training, its checks, evaluation and export."""
     partner_share: PartnerShare = 0.0

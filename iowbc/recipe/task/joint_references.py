@@ -129,8 +129,7 @@ class GaitPrior(Section):
     stance: float = Field(default=0.58, gt=0.5, lt=1.0)
     """Duty factor: fraction of the stride with a foot on the ground; above one half there is double support."""
     stride: float = Field(default=1.0, ge=0.0)
-    """Fraction of the commanded velocity and yaw rate at which stance feet move under the pelvis: at 1 the reference
-    walks as commanded and the policy only corrects it, at 0 it steps in place."""
+    """Fraction of commanded velocity and yaw rate at which stance feet move under the pelvis; 0: step in place."""
     swing_clearance: float = Field(default=0.08, gt=0.0)
     """Height of the sole at mid-swing [m], also in the reward's profile."""
     profile: Literal["sine", "rest"] = Field(default="sine", json_schema_extra=LATER)

@@ -55,8 +55,7 @@ class ObjectEquilibrium(Section):
     orientation: float = -0.5
     """Weight of the squared tilt of the object against gravity, sin² of the angle."""
     link_contact: float = -0.01
-    """Weight of the force of links other than the hands on the object [N]. 50 N of a box that rests on the lap cost as
-    much as `alive` gives; the hands, not thighs and torso, are to carry it."""
+    """Weight of the force of links but hands on the object [N]: 50 N on the lap cost as much as `alive` gives."""
     largest_link_contact: float = Field(default=200.0, ge=0.0, json_schema_extra=LATER)
     """Force at which `link_contact` saturates [N]: that of a 20 kg box on the lap."""
     beside: float = Field(default=0.0, json_schema_extra=LATER)
