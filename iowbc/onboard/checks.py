@@ -20,7 +20,8 @@ class SafetyLimits(Section):
     """Limits of checks and watchdogs."""
 
     state_age: float = Field(default=0.015, gt=0.0)
-    """Age of the newest state at which it is stale [s]: seven lost messages at 500 Hz; damping begins within 20 ms."""
+    """Age of the newest state at which it is stale [s]: seven lost messages at 500 Hz; with the loop's period, damping
+    begins within 20 ms of the last state."""
     frozen: float = Field(default=0.05, gt=0.0)
     """Time for which the inertial unit, or all motors, may repeat their values [s]: sensors have noise, and 25 states
     allow for a board that updates them more slowly."""

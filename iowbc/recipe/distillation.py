@@ -43,13 +43,16 @@ class Distillation(Encoder):
     buffer: int = Field(default=300_000, ge=1, le=100_000_000)
     """Capacity of the replay buffer [samples]; the newest are kept."""
     teacher_share: float = Field(default=0.1, ge=0, le=1)
-    """Initial fraction of training in which the teacher still acts in some environments: linearly from all to none."""
+    """Initial fraction of training in which the teacher still acts in some environments. Their number falls linearly
+    from all to none."""
     withheld: tuple[str, ...] = Field(default=(), json_schema_extra=LATER)
-    """Names of the parts of s_priv that are masked with their training mean whenever the teacher acts or labels, such
-    as a motor's strength: the student cannot react to what no history shows, and the teacher acts better without it."""
+    """Names of the parts of s_priv that are masked with their training mean whenever the teacher acts or labels. The
+    student cannot react to quantities that no history shows, such as a motor's strength, and the teacher acts better
+    without them."""
     observe_object: bool = Field(default=True, json_schema_extra=LATER)
     """Include the object in the student's observation if the teacher observes it (`task.observation.observe_object`).
-    If false, the student infers the object's pose from its history, as it infers s_priv (paper III-C.2)."""
+    If false, the student has proprioception only (paper III-C.2) and infers the object's pose from its history, as it
+    infers s_priv."""
     std: Literal["learnt", "shared"] = "learnt"
     """Standard deviation of the student's Gaussian. `learnt`: its own, trained with the KL divergence (paper eq. 7).
     `shared`: the teacher's; the loss is then a squared error scaled by it."""

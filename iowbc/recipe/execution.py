@@ -24,7 +24,8 @@ class Execution(Section):
     """Device of PPO's networks: `cpu`, or `cuda` for a GPU (`cuda:1` for the second), which needs a torch build for it.
     Rounding differs from the CPU's: a training is then reproduced closely, not bit for bit."""
     copy_files: bool = False
-    """Let nodes copy inputs and outputs to local disks even if they can access `runs/` (if not, they always do)."""
+    """Let nodes copy inputs and outputs to local disks even if they can access `runs/`, for slow shared file systems.
+    Nodes without access always copy."""
     track: bool = True
     """Record runs in MLflow."""
     experiment: str = Field(default="iowbc", min_length=1, max_length=200)

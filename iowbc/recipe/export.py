@@ -25,13 +25,15 @@ class Acceptance(Section):
     seed: int = Field(default=2000, ge=0, lt=2**32)
     """Seed of the first trial."""
     weight_in_hands: float = Field(default=0.95, ge=0, le=1)
-    """Fraction of a held object's weight, less other vertical forces, that must rest in the hands on average."""
+    """Fraction of a held object's weight, less all external vertical forces, that must rest in the hands on average;
+    the rest lies on thighs or torso."""
     transport: float = Field(default=0.5, ge=0, le=1)
     """Fraction of the commanded displacement, if any, that robot and object must cover."""
     object_beside: float = Field(default=0.35, gt=0, json_schema_extra=LATER)
     """Lateral distance from the robot beyond which a pushed object counts as lost while walking is commanded [m]."""
     minimum: int = Field(default=1, ge=0)
-    """Smallest number of survived trials with the object carried and transported for success; 0: report only."""
+    """Smallest number of survived trials with the object carried and transported for the stage to succeed; 0: report
+    only."""
 
     def problems(self) -> Iterator[tuple[str, str]]:
         if self.minimum > self.trials:
@@ -46,7 +48,8 @@ class Export(Section):
     parity_tolerance: float = Field(default=1e-5, gt=0)
     """Largest difference between torch and onnxruntime over the golden vectors [rad, action units]."""
     target_tolerance: float = Field(default=1e-3, gt=0)
-    """Largest difference between the joint targets of controller and simulation for the same action [rad]."""
+    """Largest difference between the joint targets of controller and simulation for the same action [rad]; rounding
+    differs by some 1e-6."""
     golden_steps: int = Field(default=100, ge=1, le=100_000)
     """Control steps of the rollout whose inputs and outputs are kept as golden vectors."""
     timing_steps: int = Field(default=500, ge=1, le=1_000_000, json_schema_extra=COSMETIC)

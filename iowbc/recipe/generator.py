@@ -73,7 +73,8 @@ class PostureProblem(Section):
     """Waist joints [1/rad²]. Without it hips and waist share the pitch arbitrarily, and the optimum jumps."""
     waist_share: Share = Field(default=0.0, json_schema_extra=LATER)
     """Fraction of the commanded torso pitch that is the waist's target, within its range; hips take the rest. At 1 the
-    pelvis stays level up to a bow of 0.5 rad, and the joint's stop bears loads that exceed the waist's motors."""
+    pelvis stays level up to a bow of 0.5 rad, as in the gait, and the joint's stop bears loads that exceed the waist's
+    motors."""
     friction: Positive = 0.6
     """Friction coefficient of the soles for labels; the simulation draws 0.5 to 1.2."""
     sole_fraction: Annotated[float, Field(gt=0, le=1)] = 0.9
@@ -106,10 +107,12 @@ class OptimalControl(Section):
     label_at: Annotated[float, Field(gt=0, lt=1)] = 0.7
     """Fraction of the horizon whose node is the label: the terminal node is biased by the terminal cost."""
     velocity_weight: Positive = 0.03
-    """Joint and base velocities [s²/rad²]. Where the cost is flat, postures converge in 0.2 s at 0.03, 0.3 s at 0.1."""
+    """Joint and base velocities [s²/rad²]. Along flat directions of the cost, postures converge with a time
+    constant of 0.2 s at 0.03, and 0.3 s at 0.1."""
     terminal_factor: Positive = 0.05
     """Ratio of terminal to running weights; the latter are per second, so that 0.05 equals one more interval. At 10,
-    the absence of torques at the end bends postures of flat cost by 0.25 rad, and by 0.1 at the label's node."""
+    the absence of torques at the end bends the postures of flattest cost by 0.25 rad, and by 0.1 at the label's
+    node."""
     terminal_velocity_weight: Positive = 1e2
     """Velocities at the end of the horizon [s²/rad²]."""
     limit_weight: Positive = 1e3
@@ -160,7 +163,8 @@ class FeasibleRegion(Section):
     pitches: int = Field(default=41, ge=3, le=1000)
     """Grid points over the pitch range."""
     jump: Positive = 0.055
-    """Largest joint motion of the network per step (`fit.smoothness`) [rad]; the reference jumps near straight legs."""
+    """Largest joint motion of the network per step of height or pitch (`fit.smoothness`) in the map [rad]. It excludes
+    commands near straight legs and joint limits, where the reference jumps."""
     gentle_share: Share = 0.98
     """Fraction of the arm postures for which `jump` must hold at a command."""
     arms: int = Field(default=200, ge=1, le=100_000)

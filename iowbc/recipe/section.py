@@ -19,7 +19,8 @@ from iowbc.errors import shown
 COSMETIC: dict[str, Any] = {"cosmetic": True}
 """Marks a field that changes how a stage is run or shown, but none of its results; it is not part of the key."""
 LATER: dict[str, Any] = {"later": True}
-"""Marks a field added after artifacts were published: its default, the earlier behaviour, is not part of the key."""
+"""Marks a field that was added after artifacts were published. Its default is the earlier behaviour and is not part of
+the key, so that the keys of those artifacts stay valid."""
 
 
 def in_order(ends: tuple[float, float]) -> tuple[float, float]:
@@ -63,7 +64,8 @@ class Section(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
     withdrawn: ClassVar[Mapping[str, Any]] = {}
-    """Fields of an earlier version that entered no key, with the only value that resolved recipes may still give."""
+    """Fields of an earlier version that entered no key, with the value whose behaviour remains; resolved recipes of
+    artifacts still give that value."""
     withdrawn_from_key: ClassVar[Mapping[str, Any]] = {}
     """The same for fields that entered the key, which still contains the value."""
 

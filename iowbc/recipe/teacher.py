@@ -39,22 +39,27 @@ class Check(Section):
     trials: int = Field(default=2, ge=1, le=1000)
     """Trials at each mass."""
     seed: int = Field(default=5000, ge=0, lt=2**32)
-    """Seed of the first trial; distinct from those of training, export and reported results (another `eval.split`)."""
+    """Seed of the first trial; distinct from those of training and export. Reported results have another
+    `eval.split`."""
     films: int = Field(default=0, ge=0, le=100, json_schema_extra=COSMETIC)
-    """Number of videos of a trial with medium load, evenly spaced over the training, each some 15 s without a GPU."""
+    """Number of videos of a trial with medium load, evenly spaced over the training; each takes some 15 s without a
+    GPU. 0: none."""
     sequence: tuple[Segment, ...] = STAND_WALK_TURN
     """Command sequence of a trial; empty: `scripts`, or else the fixed sequences of lifting and pushing."""
     scripts: DrawnScripts | None = Field(default=None, json_schema_extra=LATER)
-    """Random command scripts, drawn per trial, if `sequence` is empty; selection then depends on several."""
+    """Random command scripts, drawn per trial, if `sequence` is empty; selection then depends on more than one
+    script."""
     scales: Errors = Field(default=IO_WBC_UNLOADED, json_schema_extra=LATER)
     """Errors E_α [rad], E_h [m], E_v [m/s] and E_ψ [rad] that halve their part of the score; by default the paper's
     IO-WBC without a load (Table II). Errors far below their scale have little effect."""
     fall: float = Field(default=1.0, ge=0, le=1, json_schema_extra=LATER)
-    """Factor on the score of a trial that is not survived; at 1, a late fall costs less than better tracking gains."""
+    """Factor on the score of a trial that is not survived. At 1 a fall in the last of twenty seconds costs a twentieth,
+    less than slightly better velocity tracking gains."""
     collapse: float = Field(default=1 / 3, gt=0, lt=1)
     """Relative loss of the best score that counts as a collapse; training then returns to the best policy."""
     notable: float = Field(default=0.4, ge=0, lt=1)
-    """Smallest best score for a collapse to be detected: lower scores are noise, and fall before walking is learnt."""
+    """Smallest best score for a collapse to be detected. Below it, scores are mostly noise, and fall while a standing
+    policy learns to walk."""
     patience: int = Field(default=3, ge=1)
     """Consecutive checks that must show the loss: one trial of eight changes the score by a tenth."""
     caution: float = Field(default=0.5, gt=0, lt=1)
@@ -73,19 +78,23 @@ class HistoryNetwork(Encoder):
     length: int = Field(default=25, ge=2, le=1000)
     """Length of the observation history H_t (paper Table I)."""
     estimate: bool = Field(default=False, json_schema_extra=LATER)
-    """Give the layers behind the encoder an estimate of s_priv from the latent, as with `distill.start: teacher`."""
+    """Feed the layers behind the encoder an estimate of s_priv from the latent instead of the latent, as in a student
+    distilled with `distill.start: teacher`."""
     student: ArtifactName | None = Field(default=None, json_schema_extra=COSMETIC)
-    """Distilled student of this network (`estimate` included) to fine-tune with PPO, named as in `teacher.start`: PPO
-    optimizes the reward also where the history lacks the teacher's information, which distillation only imitates."""
+    """Distilled student to fine-tune with PPO, named as in `teacher.start`. Distillation imitates the teacher even if
+    the history lacks the teacher's information; PPO optimizes the reward there. The student must have this network
+    (`estimate` included)."""
 
 
 class Restart(Section):
     """A warm restart: the standard deviation is raised once and decays again, to learn new conditions."""
 
     after: int = Field(default=0, ge=0, le=10**12)
-    """Environment steps before the restart; 0: at the start, for a training from a trained policy (`teacher.start`)."""
+    """Environment steps before the restart; 0: at the start, for a training that begins from a trained policy
+    (`teacher.start`)."""
     std: float = Field(default=0.3, gt=0)
-    """Standard deviation at the restart; at 0.3 a trained policy still walks, with larger updates at the same KL."""
+    """Standard deviation set at the restart; at 0.3 a trained policy still walks, and updates may be twice as large at
+    the same KL divergence."""
     half_life: int = Field(default=4_000_000, ge=1)
     """Half-life of the standard deviation's upper bound after the restart [environment steps], down to `std_end`."""
 
@@ -130,8 +139,9 @@ class Teacher(PPO):
     restart: Restart | None = Field(default=None, json_schema_extra=LATER)
     """Warm restart of the exploration; empty: none."""
     average_half_life: int | None = Field(default=None, ge=1, le=10**12, json_schema_extra=LATER)
-    """Half-life of an exponential moving average of the policy's weights [environment steps], which is checked and
-    saved, since the newest policy also fits the noise of the last rollouts. Empty: no average."""
+    """Half-life of an exponential moving average of the policy's weights [environment steps]. The average is then the
+    policy that is checked and saved, since the newest policy also fits the noise of the last rollouts. Empty: no
+    average."""
     symmetry: Literal["construction", "none"] = "construction"
     """Use of the left-right symmetry of robot and task. `construction`: exactly equivariant networks, with half the
     multiplications. `none`: dense networks; early learning takes twice the steps."""
@@ -145,15 +155,18 @@ class Teacher(PPO):
     which is up to twice as fast; rollouts, values and output layers are always float32. Rounding alone causes a KL
     divergence of 0.0014 at a std of 0.15, and more at a smaller std: use float32 with a `desired_kl` below 0.01."""
     parts: int = Field(default=2, ge=1, le=1000)
-    """Parts of a minibatch that are computed in parallel in updates, as far as cores suffice, with the same result."""
+    """Parts of a minibatch that are computed in parallel during updates. With fewer cores they are computed one after
+    another, with the same result."""
     check: Check = Check()
     """Regular validation that keeps the best policy and returns to it after a collapse."""
     value_only: tuple[str, ...] = Field(default=(), json_schema_extra=LATER)
     """Names of the parts of s_priv that only the value network receives. A policy overfits to quantities that are drawn
-    once per episode: without 58 motor strengths and encoder biases it survived more trials and tracked better."""
+    once per episode: with 58 motor strengths and encoder biases replaced by their means, it survived more trials and
+    tracked the command better."""
     history: HistoryNetwork | None = Field(default=None, json_schema_extra=LATER)
-    """Train the student's network directly: the policy observes H_t without s_priv and can be exported. The value
-    network still observes the newest s_t and s_priv. `hidden` and `activation` are those behind the encoder."""
+    """Train the student's network directly: the policy observes H_t without s_priv, needs no distillation, and can be
+    exported. The value network, which is not deployed, still observes the newest s_t and s_priv. `hidden` and
+    `activation` are those behind the encoder."""
     seed: int | None = Field(default=None, ge=0, lt=2**32, json_schema_extra=LATER)
     """Seed of this training; empty: the recipe's `seed`. Another seed here and in `distill` repeats the training of the
     same controller with the same reference generator."""

@@ -38,7 +38,8 @@ class Robot:
     waist_pitch: Indices
     """Those of `waist` that turn about y."""
     lateral: Indices
-    """Places of the support joints that do not turn about the lateral axis; height and torso pitch do not need them."""
+    """Places of joints that do not turn about the lateral axis, among the support joints: height and torso pitch are
+    reached without them."""
     kp: Array
     """Position gains [N·m/rad]."""
     kd: Array

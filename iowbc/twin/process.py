@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 BATTERY_PERIODS = 250
 """Bus periods between two battery states."""
 POSE_PERIODS = 5
-"""Bus periods between two object poses: 100 Hz, as motion capture."""
+"""Bus periods between two poses: 100 Hz, as motion capture."""
 
 
 class ObjectTracking:

@@ -25,14 +25,16 @@ class Drake(Section):
     ground_stiffness: float = Field(default=2e5, gt=0.0)
     """Stiffness of a contact point of the soles [N/m]. On eight points the robot sinks 0.2 mm, as in MuJoCo."""
     body_stiffness: float = Field(default=1e4, gt=0.0)
-    """Stiffness of contacts of the object with palms and links, and between links [N/m]. A thigh stops an 8 kg box with
-    the force of MuJoCo's 20 ms contact. At ten times this stiffness, the impact tears the box out of the hands."""
+    """Stiffness of contacts of the object with palms and links, and between links [N/m]. An 8 kg box that hits a thigh
+    is stopped with the force of MuJoCo's contact, whose time constant is 20 ms. At ten times this stiffness, the
+    impact tears the box out of the hands."""
     relaxation: float = Field(default=0.02, ge=0.0)
     """Time constant of the linear contact damping [s]; MuJoCo's value."""
     dissipation: float = Field(default=2.0, ge=0.0)
     """Hunt-Crossley dissipation of a contact [s/m]."""
     stiction: float = Field(default=1e-3, gt=0.0)
-    """Speed below which friction is regularized [m/s, rad/s]; crates at their friction limit creep at it."""
+    """Speed below which friction is regularized, for sliding contacts and crates [m/s] and for joints [rad/s]. At its
+    friction limit a crate at rest creeps at this speed, as in MuJoCo."""
 
 
 class Success(Section):
@@ -45,29 +47,36 @@ class Success(Section):
     transport: float = Field(default=0.5, ge=0, le=1)
     """Fraction of the commanded displacement that robot and object must cover; a stationary robot covers none."""
     weight_in_hands: float = Field(default=0.95, ge=0, le=1)
-    """Fraction of a held object's weight, less other vertical forces, that must rest in the hands on average."""
+    """Fraction of a held object's weight, less all external vertical forces, that must rest in the hands on average;
+    the rest lies on thighs or torso."""
     least_weight: float = Field(default=5.0, ge=0)
-    """Weight, less the partner's nominal share, below which `weight_in_hands` is not evaluated [N]."""
+    """Weight, less the partner's nominal share, below which `weight_in_hands` is not evaluated [N]. A 0.05 kg box
+    weighs a tenth of this, and a touch of the torso is several times its weight."""
     object_beside: float = Field(default=0.35, gt=0, json_schema_extra=LATER)
     """Lateral distance from the robot beyond which a pushed object counts as lost [m]: the midpoint of the hands is
     then past the edge of a 0.6 m wide crate. For a held object see `object_distance`."""
     push_force: float = Field(default=0.5, ge=0, le=1)
-    """Fraction of the largest possible push that counts as pushing, for success in an infeasible push. The largest is μ
-    times the feet's vertical force, or the crate's rolling resistance if smaller; both averaged over a gait period."""
+    """Fraction of the largest possible push that counts as pushing, for success in an infeasible push. The largest
+    possible push is μ times the vertical ground force on both feet, or the crate's rolling resistance if that is
+    smaller; both forces are averaged over a gait period."""
     push_time: float = Field(default=0.5, ge=0, le=1)
     """Fraction of the time with commanded steps in which the robot must push with `push_force`."""
     foot_slide: float = Field(default=0.1, gt=0)
-    """Largest mean sliding speed of the loaded soles for success in an infeasible push [m/s]; twice that of walking."""
+    """Largest mean sliding speed of the loaded soles, both feet together, for success in an infeasible push [m/s];
+    twice that of walking."""
     handle_force: float = Field(default=50.0, gt=0)
-    """Largest 95th percentile of the horizontal force between partner and object for success in a compliance trial [N]:
-    above the 40 N of a firm one-arm pull, well below the 80 N at which the partner's own arms yield."""
+    """Largest 95th percentile of the horizontal force between partner and object for success in a compliance trial
+    [N]. It is slightly above the 40 N of a firm one-arm pull, and well below the 80 N at which the partner's own arms
+    yield."""
     hand_force: float = Field(default=90.0, gt=0)
     """Largest 95th percentile of the horizontal force at either hand for success in a compliance trial with a blocked
     crate [N]. Both hands then push with 180 N at most: half of what the highest friction in training (1.2) allows."""
     least_push: float = Field(default=20.0, ge=0)
-    """Smallest mean force of both hands during steps, for success in a compliance trial with a blocked crate [N]."""
+    """Smallest mean force of both hands while steps are commanded, for success in a compliance trial with a blocked
+    crate [N]. It excludes robots that do not push at all."""
     compliance_transport: float = Field(default=0.25, ge=0, le=1)
-    """Fraction of the displacement to cover in a compliance trial: half of `transport`, as the partner deviates."""
+    """Fraction of the commanded displacement that robot and object must cover in a compliance trial: half of
+    `transport`, because the partner stops, lags and deviates."""
     posture_pitch: float = Field(default=0.3, gt=0)
     """Largest mean torso pitch error for success in an infeasible push [rad]; twice the paper's E_α."""
     posture_height: float = Field(default=0.05, gt=0)
@@ -140,9 +149,11 @@ class Evaluation(Section):
     sequence: tuple[Segment, ...] = ()
     """Default command sequence of sweeps and cases; the durations add up to that of the trial. Empty: `scripts`."""
     scripts: DrawnScripts | None = None
-    """Random command scripts, drawn per trial, for sweeps and cases without a sequence; empty: fixed sequences."""
+    """Random command scripts, drawn per trial, for sweeps and cases without a sequence. Empty: the fixed sequence of
+    lifting or pushing."""
     simulation: SimulationSettings | None = None
-    """Simulation settings of all trials; empty: those of training. Set it (`{}`: the default) to compare variants."""
+    """Simulation settings of all trials; empty: those of training. Set it (`{}` for the default) to evaluate variants
+    that were trained under different settings in the same trials."""
     scenes: dict[CustomName, TrialScene] = Field(default=SIZES)
     """Additional scenes by name: other objects, sizes and grasps for an already trained policy."""
     batch: int = Field(default=64, ge=1, le=10_000)

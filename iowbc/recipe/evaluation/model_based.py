@@ -34,7 +34,8 @@ class Estimation(Section):
     model_error: Positive = 3.0
     """Standard deviation of the error of the planned acceleration in a control period [rad/s²]."""
     load_drift: Positive = 5.0
-    """Random walk of the steady error of the planned acceleration, such as that due to a load [rad/s² per √s]."""
+    """Random walk of the steady error of the planned acceleration, such as that due to a load [rad/s² per √s]. The
+    filter accounts for this error, the program does not."""
 
 
 class ModelBased(Section):
@@ -49,7 +50,8 @@ class ModelBased(Section):
     height: Tracking = Tracking(weight=100.0, stiffness=80.0, damping=14.0)
     """Height of the pelvis. With a lower weight than the centre of mass, the robot sinks to hold the torso up."""
     torso: Tracking = Tracking(weight=5.0, stiffness=250.0, damping=29.0)
-    """Torso: commanded pitch, zero roll, mean yaw of the soles; stiff, because the model lacks the load."""
+    """Orientation of the torso: commanded pitch, zero roll, mean yaw of the soles. The stiffness is high because the
+    load in the hands, which the model lacks, bends the torso."""
     posture: Tracking = Tracking(weight=0.4, stiffness=44.0, damping=12.0)
     """Support joints, towards the same reference θ_S_ref that the learnt policies correct."""
     torque_weight: Positive = 1e-3
@@ -76,4 +78,5 @@ class ModelBased(Section):
     """Fraction of a linkage's torque available to either of its two joints alone. Otherwise a waist that pitches under
     a load would have no roll torque left against falling sideways."""
     stop_torque: NonNegative = 60.0
-    """Torque that a mechanical stop may bear when its joint rests on it, as the waist's under a load [N·m]."""
+    """Torque that a joint's mechanical stop may bear when the joint rests on it [N·m]. A waist that pitches forward
+    with a load needs it in addition to its motors."""

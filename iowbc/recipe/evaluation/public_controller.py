@@ -16,7 +16,8 @@ class PublicController(Section):
     """Source of its observation, action, gains and frequency: `holosoma`: the walking policies of that project;
     `deploy`: a folder with a network and the `deploy.yaml` of Isaac Lab exports; `own`: a custom `module`."""
     module: ModuleFile | None = None
-    """Python file with `adapter(policy)`, which makes of the controller's path an `iowbc.adapters.adapter.Adapter`."""
+    """Python file with a function `adapter(policy)`, which takes the controller's path and returns an
+    `iowbc.adapters.adapter.Adapter`; for the adapter `own` alone."""
     policy: str = Field(min_length=1, json_schema_extra=COSMETIC)
     """Its file or folder: a path relative to the working folder, or PACKAGE:PATH for a file of an installed package."""
     sha256: str = Field(pattern="^[0-9a-f]{64}$")

@@ -93,7 +93,8 @@ LIFTING = (
     Segment(duration=2.0, height=0.5, pitch=0.4, ramp=1.0),
     Segment(duration=2.0, height=0.62, pitch=0.7, ramp=0.8),
 )
-"""Stand, walk, turn left, walk low and leaning with raised hands, back, sideways, turn right, crouch, bow: 20 s."""
+"""Stand, walk, turn left, walk on low and leaning with raised hands, back, sideways upright, turn right on the spot,
+crouch, bow: 20 s."""
 
 PUSHING = (
     Segment(duration=1.0, ramp=0.0),

@@ -50,7 +50,8 @@ class MassSweep(Section):
     """Rolling resistance μ of the crate's wheels; empty: drawn as in training."""
     partner_shares: tuple[PartnerShare, ...] = Field(default=(0.0, 0.5), min_length=1)
     """Nominal fractions of the weight (in pushing, of the rolling resistance) that the partner bears, besides the
-    spring and damper of its hands; a sweep for each. Negative: it resists; 0: none; empty: drawn as in training."""
+    spring and damper of its hands; the sweep runs once for each. Negative: the partner resists; 0: the robot bears all;
+    empty: drawn as in training."""
     with_share: tuple[ShareOverride, ...] = ()
     """Other masses, or another rolling resistance, for some of these shares."""
     fixed: Held = Field(default_factory=dict)
@@ -200,13 +201,16 @@ class Probe(Section):
     scene: ObjectScene = "lift"
     """Scene of `simulation.scenes`, with an object."""
     masses: tuple[PositiveFloat, PositiveFloat] = (1.0, 10.0)
-    """Lightest and heaviest object [kg], with masses spread evenly between them; by default the boxes of training."""
+    """Lightest and heaviest object [kg]; the trials' masses are spread evenly between them. The default is the range of
+    box masses in training."""
     trials: int = Field(default=180, ge=20, le=2000)
-    """Number of trials, each with its own mass and seed: more than the 70 random quantities that each draws."""
+    """Number of trials, each with its own mass and seed. Each trial draws some 70 random quantities: a regression on
+    fewer trials than that cannot distinguish the mass from the others."""
     seed: int = Field(default=9000, ge=0, lt=2**32)
     """Seed of the first trial; distinct from those of training, its checks, evaluation and export."""
     partner_share: PartnerShare = 0.0
-    """Fraction of the weight that a partner bears, as in a sweep; hands feel only the remaining weight."""
+    """Fraction of the weight that a partner bears, as in a sweep. It is zero by default, because the hands feel only
+    the remaining weight."""
     fixed: Held = Field(default_factory=dict)
     """Fixed values of other randomized quantities, by name."""
     sequence: tuple[Segment, ...] = Field(default=PROBED, min_length=1)

@@ -119,17 +119,21 @@ class PartnerSettings(Section):
     noise: Distribution = Distribution(low=0.0, high=8.0, nominal=0.0)
     """Standard deviation of the partner's random force, per horizontal axis [N]."""
     noise_resistance: float = Field(default=40.0, gt=0.0)
-    """Rolling resistance at which the random force, proportional to it in a push, is that of a lift [N]."""
+    """Rolling resistance at which the random force is as large in a push as in a lift [N]; the force in a push is
+    proportional to the resistance. The default is that of the nominal crate."""
     noise_time: float = Field(default=0.5, gt=0.0)
     """Correlation time of the random force [s]."""
     leash: float = Field(default=0.15, gt=0.0)
-    """Largest horizontal and vertical distance of the partner's target from the handle [m]."""
+    """Largest distance of the partner's target from the handle, horizontally and vertically [m]; people wait for one
+    another."""
     strongest: float = Field(default=80.0, ge=0.0)
     """Bound on the force of spring and damper, horizontal and vertical [N]."""
     hand_distance: float = Field(default=0.25, gt=0.0, json_schema_extra=LATER)
-    """Distance of a steered partner's hands from their midpoint [m]: the lever arm of the springs on the object."""
+    """Distance of each of the partner's hands from their midpoint [m]: the lever arm of the springs that turn the
+    object. Used for steered partners only."""
     push_yielding: float = Field(default=0.5, ge=0.0)
-    """Bound on that force in a push, as a fraction of the partner's share, so that it does not do all the work."""
+    """Bound on that force in a push, as a fraction of the partner's share of the resistance, so that a helping partner
+    does not do all the work."""
     stability: float = Field(default=0.3, gt=0.0, le=1.0)
     """Bound on damping · period / mass and stiffness · period² / mass, with the effective mass at the handle. Above it,
     a force held over a control period would make a light object oscillate."""

@@ -39,7 +39,8 @@ class Randomization(Section):
     enabled: bool = True
     """Enable the randomization; otherwise every entry has its nominal value."""
     object_mass_scale: Distribution = Distribution(low=0.07, high=1.5, nominal=1.0)
-    """Object mass relative to the nominal one: from the trials' lightest loads, 0.5 kg and 5 kg, to Table I's 150 %."""
+    """Object mass relative to the nominal one: from a 0.5 kg box and a 5 kg crate, the lightest loads of the trials, to
+    150 %. Table I has 50 to 150 %."""
     light_share: float = Field(default=0.0, ge=0.0, le=1.0, json_schema_extra=LATER)
     """Fraction of the episodes with a light object, whose mass is log-uniform between the lower end of
     `object_mass_scale` and `light_end`. A uniform range from 0.05 kg has only 4 % of its masses below 0.5 kg."""

@@ -28,8 +28,9 @@ class Grasp(Section):
     """Fraction of a hand's load in a compliant grasp that friction bears. For it the palm presses with load / friction,
     which loads the arms' motors; fingers beneath the object bear the rest."""
     stiffness: float = Field(default=4.0, ge=0.0)
-    """Stiffness with which the palms resist rotation of the object about the line between them [N·m/rad]: low enough
-    for the torque of tilted hands (5 N·m wrists), high enough for the imbalance that a partner leaves."""
+    """Stiffness with which the palms resist rotation of the object about the line between them [N·m/rad]. It is low
+    enough that a box still hangs and that 5 N·m wrists bear the torque of tilted hands, and high enough to bear the
+    imbalance that a partner leaves."""
     torsion: float = Field(default=0.02, ge=0.0, json_schema_extra=LATER)
     """Ratio of a palm's slip torque about the line between the hands to its slip force [m]: two thirds of the radius of
     a 3 cm contact patch. Two hands of a compliant grasp bear 5.6 N·m at friction 1.0."""
@@ -42,7 +43,8 @@ class Grasp(Section):
     height: float = 0.08
     """Height of the grips above the object's centre [m]; above the centre of mass, so that the object hangs stably."""
     settling: int = Field(default=5, ge=0, le=1000)
-    """Iterations of MuJoCo's noslip solver in each physics step, which remove the creep of a grasp by contact."""
+    """Iterations of MuJoCo's noslip solver in each physics step, with the elliptic friction cone; they remove the creep
+    of a grasp by contact."""
     handover: float = Field(default=0.5, ge=0.0)
     """Ramp of the object's weight at the start of an episode [s]; a sudden load would pull with twice the weight."""
     swing_damping: float = Field(default=3.0, ge=0.0)
@@ -62,8 +64,9 @@ class Object(Section):
     smallest_mass: float = Field(default=0.05, gt=0.0)
     """Smallest simulated mass [kg]; smaller ones, including zero, are raised to it: a free body needs inertia."""
     smallest_inertia: float = Field(default=0.5, gt=0.0, json_schema_extra=LATER)
-    """Mass whose inertia lighter objects have [kg]; their weight stays their own. With less inertia, forces of grip and
-    partner that are held over a control period would be so soft (`stability`) that a 0.05 kg box turned over."""
+    """Mass whose inertia lighter objects have [kg]; their weight stays their own. Forces of grip and partner are held
+    over a control period; on a body with less inertia they would have to be so soft (`stability`) that a 0.05 kg box
+    turned over between its carriers."""
     mesh: MeshFile | None = Field(default=None, json_schema_extra=LATER)
     """An .obj or .stl file beside the recipe, x forward and z up."""
     scale: float = Field(default=1.0, gt=0.0, json_schema_extra=LATER)
@@ -97,7 +100,8 @@ class Scene(Section):
     palm_radius: float = Field(default=0.03, gt=0.0)
     """Radius of the spheres with which palms touch an object [m]."""
     yaw_arm: float = Field(default=0.3, gt=0.0)
-    """Mean distance of the crate's wheels from its centre [m]: lever arm of the rolling resistance in a turn."""
+    """Mean distance of the crate's wheels from its centre [m]. Multiplied by the rolling resistance, it is the torque
+    that resists turning."""
     creep: float = Field(default=0.02, gt=0.0)
     """Speed below which a crate counts as at rest [m/s]; the solver lets a stuck crate creep at 1 mm/s."""
 

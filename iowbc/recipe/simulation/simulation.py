@@ -47,7 +47,8 @@ class Physics(Section):
     """Damping of the joint controllers: integrated implicitly (stable at any gain) or, as on the robot, computed
     explicitly from the measured state at the physics rate, which requires a short step (2 ms here)."""
     torque_corner: float = Field(default=0.6, ge=0.0, lt=1.0)
-    """Fraction of the no-load speed from which a motor's full torque falls linearly to zero; an assumption."""
+    """Fraction of the no-load speed up to which a motor gives its full torque; beyond it, the torque falls linearly to
+    zero. An assumption, not a measured curve."""
     cone: Literal["pyramidal", "elliptic"] = "pyramidal"
     """Friction cone: an inscribed pyramid, or the exact elliptic cone at 10 % more computing time."""
     solver: Literal["newton", "cg"] = "newton"

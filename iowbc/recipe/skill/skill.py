@@ -41,12 +41,14 @@ class SkillLearning(PPO):
     """Decisions of each game between two updates. Every rollout restarts all games, so that a resumed training needs no
     state of the simulation: what comes later in an episode than a rollout is long is not trained."""
     imitation_steps: int = Field(default=100_000, ge=0, le=10**12)
-    """Initial decisions in which the robot acts but imitates a robot that knows the path (DAgger) instead of learning
-    from reward; the value network is trained. With the reward only, 76,000 decisions changed nothing."""
+    """Initial decisions in which the robot learns by imitation instead of reward: it acts, and imitates the actions of
+    a robot that knows the path (DAgger), while the value network is trained. With the reward only, 76,000 decisions
+    changed nothing."""
     scripted_steps: int = Field(default=200_000, ge=0, le=10**12)
     """Initial decisions, including those of the imitation, in which all humans are scripted."""
     learnt_share: float = Field(default=0.5, ge=0, le=1)
-    """Fraction of later episodes with the learnt human; the others have scripted ones, for robustness."""
+    """Fraction of later episodes with the learnt human; the others have scripted humans, so that the robot does not
+    learn to rely on one partner."""
     imitation_gradient_steps: int = Field(default=200, ge=1, le=100_000)
     """Gradient steps of the imitation after each rollout."""
     imitation_rate: float = Field(default=1e-3, gt=0)
@@ -104,7 +106,8 @@ class SkillEvaluation(Section):
     known: tuple[bool, ...] = (True, False)
     """Knowledge of the path: `true` if the robot has it, `false` if only the human does."""
     partners: tuple[str, ...] = ()
-    """Humans: scripted behaviours, and `agent` for the learnt one; empty: training, held out, and learnt ones."""
+    """Humans: scripted behaviours, and `agent` for the learnt one. Empty: those of training, those held out, and the
+    learnt one."""
     loads: tuple[float, ...] = Field(default=(0.5,), min_length=1)
     """Masses as fractions of the task's range: 0 is its lower end, 1 its upper end."""
     masses: dict[ObjectScene, Ascending] = Field(default_factory=dict, json_schema_extra=LATER)
@@ -127,7 +130,8 @@ class GameReward(Section):
     progress: float = Field(default=1.0, ge=0.0)
     """Potential per metre of the path covered by the object [1/m]; the other weights are relative to it."""
     path: float = Field(default=0.5, ge=0.0)
-    """Loss of potential per metre between object and path [1/m]; below `progress`, so that detours may pay."""
+    """Loss of potential per metre of the object's distance from the path [1/m]; below `progress`, so that detours may
+    pay."""
     yaw: float = Field(default=0.3, ge=0.0)
     """Loss of potential per radian of the object's yaw relative to the path's heading [1/rad]."""
     height: float = Field(default=2.0, ge=0.0)
@@ -139,13 +143,15 @@ class GameReward(Section):
     touch: float = Field(default=0.5, ge=0.0)
     """Cost per second of contact between the object and a wall [1/s]."""
     internal_force: float = Field(default=0.002, ge=0.0)
-    """Cost of the horizontal force that both agents exert against each other [1/(N·s)]: 20 N over 15 s cost 0.6 m."""
+    """Cost of the horizontal internal force, in which both agents' forces cancel [1/(N·s)]: 20 N over 15 s cost as much
+    as 0.6 m."""
     partner_work: float = Field(default=0.004, ge=0.0)
     """Cost of the absolute mechanical work of the human beyond its share [1/J]: 50 J cost as much as 0.2 m."""
     tilt: float = Field(default=0.1, ge=0.0)
     """Cost of the object's tilt over time [1/(rad·s)]."""
     jerk: float = Field(default=0.02, ge=0.0)
-    """Cost of the mean squared change of the robot's action per decision [1]; noise of 0.3 costs half a centimetre."""
+    """Cost of the mean squared change of the robot's action from decision to decision [1]; noise of 0.3 costs half
+    a centimetre a decision."""
     time: float = Field(default=0.02, ge=0.0)
     """Cost of time [1/s]: standing still for 20 s costs 0.4 m."""
 
@@ -169,7 +175,8 @@ class RobotAgent(Section):
     """Height of the nominal command in a push [m]; empty: the nominal height. At 0.66 m and a pitch of 0.4 rad
     `compliant_merged` pushes 80 kg at 0.63 of the pace, at 0.72 m and 0.2 rad at 0.44."""
     admittance: tuple[float, float] = (0.012, 0.008)
-    """Velocity of a nominal follower per force on its hands, forward and to the left [m/(N·s)]: 0.36 m/s at 30 N."""
+    """Admittance of a nominal follower: velocity per force on its hands, forward and to the left [m/(N·s)]: 30 N make
+    it walk at 0.36 m/s."""
     deadband: float = Field(default=4.0, ge=0.0)
     """Force below which a nominal follower stands [N]; the force estimate has an error of this size."""
     push_force: float = Field(default=40.0, gt=0.0)
@@ -184,7 +191,8 @@ class HumanAgent(Section):
     """The human: its strength, and limits of the learnt human's deviation from the scripted motion along the path."""
 
     strongest: float = Field(default=50.0, gt=0.0)
-    """Bound on the force of its arms [N], for `simulation.partner.strongest`; it cannot move the crate alone."""
+    """Bound on the force of spring and damper of its arms [N]; it replaces `simulation.partner.strongest`. Even with
+    its share of the resistance, it cannot move the crate alone."""
     velocity: float = Field(default=0.3, gt=0.0)
     """Largest change of the horizontal velocity of the handle, per axis [m/s]: as fast as the script walks."""
     vertical_velocity: float = Field(default=0.1, gt=0.0)

@@ -63,9 +63,11 @@ class Commands(Section):
     nominal_pitch: float = 0.0
     """Torso pitch of the nominal posture [rad]."""
     standing_episodes: float = Field(default=0.1, ge=0.0, le=1.0)
-    """Fraction of the episodes without walking, which train balance and loads from the start; 1: standing only."""
+    """Fraction of the episodes without walking. They train balance, posture and loads before walking is learnt; 1:
+    standing only."""
     standing_share: float = Field(default=0.15, ge=0.0, le=1.0)
-    """Fraction of standing commands in the other episodes. With twice as many, a robot only stepped in place."""
+    """Fraction of standing commands in the other episodes, so that three in four of all commands walk. With two in four
+    a robot learnt to step in place and never walked."""
     straight_share: float = Field(default=0.5, ge=0.0, le=1.0)
     """Fraction of the walking commands without yaw rate and lateral velocity."""
     turning_share: float = Field(default=0.1, ge=0.0, le=1.0)
@@ -76,7 +78,8 @@ class Commands(Section):
     """Initial posture of an episode with a held object, as a fraction of the way from the nominal to the drawn posture;
     at 1 a third of the objects would start inside thighs or torso. The command then approaches the drawn posture."""
     smallest_speed: float = Field(default=0.25, ge=0.0)
-    """Smallest planar speed of a walking command [m/s], even out of its range, so that stepping is worthwhile."""
+    """Smallest planar speed of a walking command [m/s]. Slower ones are raised to it, even out of their range, so that
+    stepping is worthwhile."""
     smallest_yaw_rate: float = Field(default=0.2, ge=0.0)
     """Smallest yaw rate of a turn on the spot [rad/s]; slower ones are raised to it, for the same reason."""
     resampling: Range = (3.0, 7.0)

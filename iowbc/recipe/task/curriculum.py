@@ -44,24 +44,28 @@ class Curriculum(Section):
     fixed_level: float = Field(default=1.0, ge=0.0, le=2.0)
     """Level of all axes without a curriculum, in evaluation and in single environments. 1: the recipe's own ranges."""
     velocity: Scale = Scale(start=1.0, full=1.0, extreme=1.3)
-    """Factor on the range of v_x at each level of locomotion. Starting at 0.6, robots hardly learnt to walk."""
+    """Factor on the range of v_x at each level of locomotion; by default the full range from the start. At 0.6, a robot
+    that steps in place tracks the command so closely that it hardly learns to walk."""
     turning: Scale = Scale(start=0.2, full=1.0, extreme=1.3)
     """Factor on the ranges of v_y and yaw rate at each level of locomotion: straight walking is learnt first."""
     posture: Scale = Scale(start=0.2, full=1.0, extreme=1.0)
     """Factor on the ranges of height, pitch and wrist offsets, around the nominal posture."""
     load: Scale = Scale(start=0.15, full=1.0, extreme=1.3)
-    """Upper end of the mass range, relative to the scene's own. At 1.3 the box has 13.5 kg; shoulders hold 12 to 16."""
+    """Upper end of the mass range, relative to the scene's own; the lower end is constant. At 1.3 the box weighs up to
+    13.5 kg, and shoulders hold 12 to 16."""
     resistance: Scale = Scale(start=0.5, full=1.0, extreme=3.0)
     """Factor on a crate's rolling resistance at each level of load; at 3 it is near the limit of foot friction."""
     blocked: Scale = Scale(start=0.0, full=0.0, extreme=0.25)
     """Fraction of the pushes with a blocked crate at each level of load. Together with `resistance`, more than 30 % of
     the pushes at level 2 are infeasible: they teach the robot to stay upright against an immovable crate."""
     blocking: float = Field(default=50.0, ge=1.0, json_schema_extra=LATER)
-    """Factor on the rolling resistance of a blocked crate; at the nominal 0.06, crates of 13 kg or more do not move."""
+    """Factor on the rolling resistance of a blocked crate. At the nominal resistance of 0.06, a 13 kg crate resists
+    with 392 N, the most that feet hold, and heavier ones do not move."""
     disturbance: Scale = Scale(start=0.0, full=1.0, extreme=1.5)
     """Factor on impulses and pushes."""
     balance: Ceilings = Ceilings(posture=1.0, locomotion=0.5, load=1.0, disturbance=0.3)
-    """Phase 1: static balance under varied loads, with slow walking, which takes longest to learn."""
+    """Phase 1: static balance under varied loads. Slow walking, which takes longest to learn, is practised from the
+    start."""
     locomotion: Ceilings = Ceilings(posture=1.0, locomotion=1.0, load=1.0, disturbance=1.0)
     """Phase 2: locomotion with impulses; an environment enters it when it has reached all ceilings of phase 1."""
     extreme: Ceilings = Ceilings(posture=2.0, locomotion=2.0, load=2.0, disturbance=2.0)
@@ -77,7 +81,8 @@ class Curriculum(Section):
     early: float = Field(default=0.7, gt=0.0, le=1.0)
     """Fraction of the time limit before which an end counts as a failure."""
     tracking: float = Field(default=0.65, ge=0.0, le=1.0)
-    """Smallest mean score of height and of pitch (reward kernels) for a success of posture, load and disturbance."""
+    """Smallest mean score of height and of pitch, by the kernels of their reward terms, for a success of posture, load
+    and disturbance."""
     progress: float = Field(default=0.6, ge=0.0, le=1.0)
     """Smallest fraction of the commanded displacement for a success of locomotion, counted along the command and no
     faster than it. Above level 1, where commands may be infeasible, posture counts instead."""
@@ -87,7 +92,8 @@ class Curriculum(Section):
     heading: float = Field(default=0.5, gt=0.0)
     """Largest mean heading error [rad] for a success of locomotion; it does not count above level 1."""
     lagging: float = Field(default=0.2, ge=0.0, le=1.0)
-    """Fraction of the commanded displacement below which a walk lowers the level of locomotion even without a fall."""
+    """Fraction of the commanded displacement below which an episode with walking lowers the level of locomotion even
+    without a fall: the robot stepped in place."""
     least_walk: float = Field(default=2.0, ge=0.0)
     """Smallest time with a commanded velocity for an episode to affect the level of locomotion [s]."""
     replay: float = Field(default=0.0, ge=0.0, le=1.0, json_schema_extra=LATER)

@@ -57,7 +57,8 @@ class ArmReference(Section):
     damping: float = Field(default=0.05, gt=0.0)
     """Damping of the pseudo-inverse [m]: joint motion is bounded by |Δx| / (2·damping) next to a singular posture."""
     reach: float = Field(default=0.2, ge=0.0)
-    """Squared damping per metre of error [m]: stretched towards an unreachable target, an arm does not overshoot."""
+    """Squared damping added per metre of error [m]; an arm stretched towards an unreachable target then settles instead
+    of overshooting."""
     longest_step: float = Field(default=0.1, gt=0.0)
     """Bound on the error of an iteration [m], so that a wrist approaches a distant target without overshooting."""
     posture_gain: float = Field(default=1.0, ge=0.0)
@@ -77,7 +78,8 @@ class Recovery(Section):
     extrapolated over `horizon`. A quiet robot measures a median of 0.1, and 0.25 in one step of a hundred: up to 0.15
     the clock runs most of the time. At 0.4 steps come too late for 20 N·s."""
     horizon: float = Field(default=0.25, ge=0.0)
-    """Time over which the tilt is extrapolated [s]: sqrt(h / g) of a pelvis at 0.7 m, to the capture point's angle."""
+    """Time over which the tilt is extrapolated at the measured rate [s]: sqrt(h / g) of a pelvis at 0.7 m, so that the
+    sum is the capture point's angle."""
 
 
 class Placement(Section):
@@ -93,17 +95,20 @@ class Placement(Section):
     return_time: float = Field(default=0.27, gt=0.0)
     """Time constant of a stance foot's return to its nominal place [s]: sqrt(h / g) of a 0.7 m pendulum."""
     integral: float = Field(default=0.0, ge=0.0, json_schema_extra=LATER)
-    """Backward shift of both feet per metre of estimated lag behind the command, to lean into a push [m/m]. Without it,
-    a 10 kg crate moves at 1.18 and a 60 kg crate at 0.56 of the commanded speed; with 0.05 at 1.07 and 0.74."""
+    """Backward shift of both feet per metre of estimated lag behind the command, so that the robot leans into a push
+    [m/m]. Without it, a 10 kg crate moves at 1.18 and a 60 kg crate at 0.56 of the commanded speed; with 0.05 at 1.07
+    and 0.74."""
     longest_trim: float = Field(default=0.1, ge=0.0, json_schema_extra=LATER)
-    """Largest shift by `integral` [m]: that for 36 N at hands 0.95 m above the ground and a 35 kg robot."""
+    """Largest shift by `integral` [m]: that for 36 N at hands 0.95 m above the ground and a 35 kg robot. With 0.16,
+    policies that were not trained with it fall."""
 
 
 class TorsoFeedback(Section):
     """Feedback of the torso's pitch on both hips, to relieve the waist's 35 to 50 N·m: a bow with 8 kg needs 54."""
 
     integral: float = Field(default=0.1, ge=0.0)
-    """Hip rotation rate per radian by which the torso leans further than commanded [1/s]."""
+    """Hip rotation rate per radian by which the torso leans further than commanded [1/s]. At 0.3, a policy that was not
+    trained with it fails a few more lifts of 4 kg."""
     furthest: float = Field(default=0.15, ge=0.0)
     """Largest backward rotation of the pelvis by the hips [rad]; without it a robot with 8 kg leans 0.2 further."""
     least: float = Field(default=0.05, ge=0.0)
@@ -127,20 +132,25 @@ class GaitPrior(Section):
     frequency: float = Field(default=1.35, gt=0.0)
     """Stride frequency [Hz]."""
     stance: float = Field(default=0.58, gt=0.5, lt=1.0)
-    """Duty factor: fraction of the stride with a foot on the ground; above one half there is double support."""
+    """Duty factor: fraction of the stride in which a foot is on the ground; above one half there are two double-support
+    phases per stride."""
     stride: float = Field(default=1.0, ge=0.0)
-    """Fraction of commanded velocity and yaw rate at which stance feet move under the pelvis; 0: step in place."""
+    """Fraction of the commanded velocity and yaw rate at which stance feet move under the pelvis: at 1 the reference
+    walks as commanded and the policy only corrects it, at 0 it steps in place."""
     swing_clearance: float = Field(default=0.08, gt=0.0)
     """Height of the sole at mid-swing [m], also in the reward's profile."""
     profile: Literal["sine", "rest"] = Field(default="sine", json_schema_extra=LATER)
-    """Height over the swing: clearance·sin(π·progress), landing at 0.81 m/s, or ·sin²(π·progress), landing at rest."""
+    """Height over the swing: clearance·sin(π·progress), which lands at 0.81 m/s, or clearance·sin²(π·progress), which
+    lifts off and lands at rest."""
     sway: float = Field(default=0.02, ge=0.0)
-    """Amplitude of the pelvis' lateral motion over the stance foot [m]; a 0.7 m pendulum would sway by 0.022 m."""
+    """Amplitude of the pelvis' lateral motion over the stance foot [m]. A 0.7 m pendulum that steps from side to side
+    every 0.37 s, between feet 0.24 m apart, sways by 0.022 m."""
     spread: float = Field(default=0.0, ge=0.0, le=0.1, json_schema_extra=LATER)
     """Outward shift of each foot relative to the support posture, standing and walking [m]. `compliant_quick` survives
     215 of 240 disturbed trials with 0.04 and 200 without, but pushes 60 kg at two thirds of the pace."""
     straightest_knee: float = Field(default=0.1, gt=0.0)
-    """Smallest knee flexion [rad]; closer to the straight leg, millimetres of reach are tenths of a radian."""
+    """Smallest knee flexion, which limits the length of a stride [rad]; closer to the straight leg, millimetres of
+    reach are tenths of a radian."""
     moving_speed: float = Field(default=0.05, gt=0.0)
     """Commanded planar speed above which the clock runs [m/s]."""
     moving_yaw_rate: float = Field(default=0.1, gt=0.0)
@@ -171,7 +181,8 @@ class References(Section):
     """Torso pitch to which commands are clamped, within the feasible map [rad]. The map contains all commands with a
     support posture in equilibrium; a policy may achieve less. Empty: only the map clamps."""
     upright: bool = Field(default=False, json_schema_extra=LATER)
-    """Ignore commanded height and pitch in the references, for controllers that take velocities only."""
+    """Ignore commanded height and pitch in the references. This is for controllers that take velocities only: their
+    torso does not follow, and the arms would reach to the wrong place."""
     arms: ArmReference = ArmReference()
     """Arm references."""
     gait: GaitPrior = GaitPrior()

@@ -55,7 +55,8 @@ class ObjectEquilibrium(Section):
     orientation: float = -0.5
     """Weight of the squared tilt of the object against gravity, sin² of the angle."""
     link_contact: float = -0.01
-    """Weight of the force of links but hands on the object [N]: 50 N on the lap cost as much as `alive` gives."""
+    """Weight of the force of links other than the hands on the object [N]. 50 N of a box that rests on the lap cost as
+    much as `alive` gives; the hands, not thighs and torso, are to carry it."""
     largest_link_contact: float = Field(default=200.0, ge=0.0, json_schema_extra=LATER)
     """Force at which `link_contact` saturates [N]: that of a 20 kg box on the lap."""
     beside: float = Field(default=0.0, json_schema_extra=LATER)
@@ -101,7 +102,8 @@ class GaitConstraint(Section):
     """Weight of the sliding speed of the soles, averaged with the load of each as weight [m/s]. With squared speeds, a
     slide of 0.1 m/s cost almost nothing, and walking feet slid 0.3 m per metre."""
     touchdown: float = Field(default=0.0, json_schema_extra=LATER)
-    """Weight of the squared downward velocity of both soles [m²/s²], which fades over `touchdown_height`."""
+    """Weight of the squared downward velocity of both soles near the ground [m²/s²], which fades with their height over
+    `touchdown_height`."""
     touchdown_height: float = Field(default=0.02, gt=0.0, json_schema_extra=LATER)
     """Height of a sole at which `touchdown` counts 37 % [m]."""
     standing: float = -1.0
@@ -123,7 +125,8 @@ class Yielding(Section):
     """
 
     held: float | None = Field(default=None, gt=0.0)
-    """Damping b of a held object [N·s/m]; empty: infinite, as in the paper. At 60, 0.5 m/s are given up at 40 N."""
+    """Damping b of a held object [N·s/m]; empty: infinite, as in the paper. At 60 a robot commanded to move at 0.5 m/s
+    stays with a partner that stands still at a force of 40 N."""
     pushed: float | None = Field(default=None, gt=0.0)
     """Damping b of a pushed crate [N·s/m]; empty: infinite. At 280 a robot leans on a blocked crate with 75 N per hand
     at a command of 0.5 m/s: over half of what the friction of its feet allows, and under 90 N."""
@@ -159,7 +162,8 @@ class Later(Section):
     end: float = Field(default=0.9, ge=0.0, le=2.0)
     """Level from which the later weights apply; weights are interpolated between the two levels."""
     weights: dict[str, float] = Field(default_factory=dict)
-    """Later weight by a term's dotted path in `task.reward`, such as `sync.progress`, which makes walkers hurry."""
+    """Later weight by the dotted path of a term in `task.reward`, such as `sync.progress`, which teaches walking but
+    makes a robot that walks hurry."""
 
     def problems(self) -> Iterator[tuple[str, str]]:
         if self.begin >= self.end:
