@@ -168,10 +168,9 @@ def robot_sim(
     from iowbc.onboard.dds import DdsBus
     from iowbc.onboard.operators import pose_port
     from iowbc.onboard.ranges import Ranges
-    from iowbc.twin.process import serve
+    from iowbc.twin.process import ObjectTracking, serve
     from iowbc.twin.robot import Twin
     from iowbc.twin.support import Support
-    from iowbc.twin.tracking import ObjectTracking
 
     console = stdout_console()
     tracking = None if object_pose is None else ObjectTracking(pose_port(object_pose))
@@ -215,7 +214,7 @@ def robot_sim(
     def going() -> bool:
         return not stop.is_set() and twin.time < seconds
 
-    serve(bus, twin, going, lockstep=lockstep, each=watch, answer=bus.answer_mode_requests)
+    serve(bus, twin, going, watch, lockstep=lockstep)
     tell(console, twin.verdict)
     bus.close()
     if tracking is not None:

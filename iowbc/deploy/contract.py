@@ -25,8 +25,6 @@ from iowbc.robot.description import DESCRIPTION
 Kind = TypeVar("Kind", bound=Section)
 LARGEST_CONTRACT = 1_000_000
 """Largest contract that is read [bytes]."""
-FORMAT: Literal[4] = 4
-"""Format of the contracts that are written and read."""
 GENERATOR_FILES = (WEIGHTS, ARCHITECTURE, FEASIBLE)
 TORQUE = (
     "torque = clip(kp * (target - position) - kd * velocity, -effort, effort) for each joint [N·m], computed at "
@@ -70,7 +68,7 @@ class Latency(Section):
 class Contract(Section):
     """Content of `contract.json`."""
 
-    format: Literal[4] = FORMAT
+    format: Literal[4] = 4
     """Raised when a reader of the old format would misread the new one."""
     recipe: str
     """Name of the recipe that was exported."""
@@ -141,8 +139,7 @@ class Contract(Section):
 
     @model_validator(mode="after")
     def _sizes_and_ports_fit(self) -> Self:
-        """Checks one number per joint, and the inputs and outputs that the control loop needs among those of the
-        graph."""
+        """Checks one number per joint, and the ports of the graph that the control loop needs."""
         joints = len(self.joints)
         for name in ("kp", "kd", "effort", "velocity_limit", "lower", "upper", "default_position"):
             values = getattr(self, name)
@@ -158,16 +155,9 @@ class Contract(Section):
         if not all(low < high for low, high in zip(self.lower, self.upper, strict=True)):
             raise ValueError(f"lower {self.lower} does not lie below upper {self.upper}")
         support, size = len(self.support), sum(math.prod(part.shape) for part in self.state)
-        needed: dict[str, dict[str, tuple[int, ...]]] = {
-            "inputs": {"command": (len(COMMAND),), "grasp": (2, 3), "load": (1,), "state": (size,)},
-            "outputs": {
-                "target": (len(self.joints),),
-                "action": (support,),
-                "support_reference": (support,),
-                "state_next": (size,),
-            },
-        }
-        for side, shapes in needed.items():
+        inputs = {"command": (len(COMMAND),), "grasp": (2, 3), "load": (1,), "state": (size,)}
+        outputs = {"target": (joints,), "action": (support,), "support_reference": (support,), "state_next": (size,)}
+        for side, shapes in (("inputs", inputs), ("outputs", outputs)):
             found = {port.name: port.shape for port in getattr(self, side)}
             for name, shape in shapes.items():
                 if found.get(name) != shape:
@@ -180,8 +170,7 @@ class Contract(Section):
 
 
 def metadata(contract: Contract) -> dict[str, str]:
-    """Metadata of both ONNX files: the contract without file digests, and its main entries under the names that other
-    exporters use."""
+    """Metadata of both ONNX files: the contract without file digests, and main entries by other exporters' names."""
 
     def listed(values: tuple[float, ...]) -> str:
         return ",".join(f"{value:g}" for value in values)

@@ -93,7 +93,6 @@ class Controller:
             self._good["object_quaternion"][:, 0] = 1.0
         self.inputs: Values = {}
         """Inputs of the last step, with the last good ones of robots whose own were refused."""
-        self.outputs: Values = {}
         self.targets: Array = np.zeros((robots, len(contract.joints)))
         """Joint targets of the last step, (n, joints) [rad]."""
         self._scene = {name: np.zeros(shapes[name], np.float32) for name in ("grasp", "load")}
@@ -191,7 +190,7 @@ class Controller:
         refused[list(refusals)] = True
         self._state = np.where(refused[:, None], self._state, after)
         self._starts = self._starts & refused
-        self.inputs, self.outputs, self.targets = inputs, outputs, passed
+        self.inputs, self.targets = inputs, passed
         return Targets(passed, self._kp, self._kd, outputs["action"], outputs["support_reference"], held, reasons)
 
     def settled_posture(self, command: Array) -> Array:

@@ -162,8 +162,7 @@ class Skill:
         return replace(measured, **given)
 
     def _sense(self, measured: Measured) -> Array:
-        """Observes for the decision of the next step, which spreads the work over two steps; yaw of the objects (n,)
-        [rad]."""
+        """Observes for the decision of the next step, to spread the work; yaw of the objects, (n,) [rad]."""
         command, thing = self._command, of_object(measured, self.contract.sees_object)
         if self._passed:
             state = self._controller.state

@@ -10,8 +10,6 @@ import torch
 from iowbc.deploy.controller import Values
 from iowbc.export.graph import Program
 
-LEADING_AXIS = "robots"
-
 
 def write_onnx(program: Program, path: Path, opset: int, about: Mapping[str, str]) -> None:
     """Write the module with named inputs and outputs and any number of robots as leading axis.
@@ -31,7 +29,7 @@ def write_onnx(program: Program, path: Path, opset: int, about: Mapping[str, str
             output_names=outputs,
             opset_version=opset,
             dynamo=False,
-            dynamic_axes={name: {0: LEADING_AXIS} for name in (*names, *outputs)},
+            dynamic_axes={name: {0: "robots"} for name in (*names, *outputs)},
         )
     model = onnx.load(path)
     for part in (model, model.graph, *model.graph.node, *model.graph.input, *model.graph.output):

@@ -186,15 +186,3 @@ def beyond(now: MeasuredState, contract: Contract, limits: SafetyLimits) -> str 
         if excess[joint := int(np.argmax(excess))] > 0.0:
             return f"{name} limit: {contract.joints[joint]} at {value[joint]:.2f} {unit}"
     return None
-
-
-def exhausted(
-    now: MeasuredState, charge: float | None, joints: tuple[str, ...], least: float, most: float
-) -> dict[str, str]:
-    """Messages about a battery below `least` [%] and a motor above `most` [°C]; `charge`: None if unknown [%]."""
-    found = {}
-    if charge is not None and charge < least:
-        found["battery"] = f"battery at {charge:.0f} %, less than {least:g}"
-    if now.temperature[hottest := int(np.argmax(now.temperature))] > most:
-        found["temperature"] = f"temperature: {joints[hottest]} at {now.temperature[hottest]:.0f} °C, above {most:g}"
-    return found

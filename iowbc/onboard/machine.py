@@ -154,8 +154,15 @@ class Machine:
         )
 
     def _exhausted(self, least: float, most: float) -> dict[str, str]:
+        """Messages about a battery below `least` [%] and a motor above `most` [°C]."""
         assert self.sensors.posture is not None
-        return checks.exhausted(self.sensors.posture, self._charge, self._contract.joints, least, most)
+        found, charge, temperature = {}, self._charge, self.sensors.posture.temperature
+        if charge is not None and charge < least:
+            found["battery"] = f"battery at {charge:.0f} %, less than {least:g}"
+        if (hottest := temperature.max()) > most:
+            joint = self._contract.joints[int(np.argmax(temperature))]
+            found["temperature"] = f"temperature: {joint} at {hottest:.0f} °C, above {most:g}"
+        return found
 
     def _refusal(self, wanted: State, given: CycleInputs) -> str | None:
         """Reason to refuse a requested state."""
@@ -186,8 +193,7 @@ class Machine:
         return None
 
     def _stale_input(self, given: CycleInputs, *, pose: bool) -> str | None:
-        """Reason if the newest command is stale, or with `pose` an object pose that the policy observes is stale or
-        missing."""
+        """Reason if the newest command is stale, or with `pose` a pose that the policy observes is stale or missing."""
         wanted, limits = given.wanted, self.limits
         if (age := given.now - wanted.at) > limits.command_age:
             return f"stale command: nothing new for {age:.2f} s"

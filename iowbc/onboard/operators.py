@@ -175,8 +175,7 @@ class Datagram(Section):
 
 
 class Udp:
-    """JSON datagrams at a local port; see `Datagram`. Of datagrams that cannot be parsed only a request to damp counts;
-    those with `seen` alone are no commands."""
+    """JSON datagrams at a local port; see `Datagram`. Of invalid ones only a request to damp counts."""
 
     def __init__(self, ranges: Ranges, port: int) -> None:
         self.ranges = ranges

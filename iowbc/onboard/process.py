@@ -7,7 +7,7 @@ import os
 import queue
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Self
 
@@ -137,14 +137,52 @@ def drive(
     stopped: Callable[[], bool] = lambda: False,
 ) -> Times:
     """Drives the robot until `stopped` or for some time [s], and damps it at the end, also after an error."""
-    with Teller(tell) as teller:
-        try:
-            return _driven(bus, machine, operator, clock, seconds, log, teller.put, stopped)
-        except BaseException:
-            for _ in range(round(FINAL_DAMPING / PERIOD)):
-                bus.publish(machine.damp())
-                time.sleep(PERIOD)
-            raise
+    kept = np.full((2, KEPT_TIMES), np.nan, np.float32)  # allocated in advance
+    turns = 0
+    begin: float | None = None
+    leaving: float | None = None
+    with Teller(tell) as teller, _damping_after_errors(bus, machine):
+        while True:
+            now, states = clock.turn(bus)
+            started = time.perf_counter()
+            others = len(bus.take(messages.LOW_COMMAND))
+            begin = now if begin is None else begin
+            wanted = operator.wanted(now, states[-1] if states else machine.sensors.state)
+            if leaving is None and (stopped() or now - begin >= seconds):
+                leaving = now
+            if leaving is not None:
+                wanted = replace(wanted, request=State.DAMPING)
+            batteries = bus.take(messages.BATTERY_STATE)
+            charge = float(batteries[-1]["soc"]) if batteries else None
+            given = CycleInputs(now, states, wanted, others, charge)
+            command = machine.turn(given)
+            bus.publish(command)
+            for event in machine.events:
+                teller.put(f"{now - begin:8.3f} s  {event}")
+                if log is not None:
+                    log.add("event", now, text=event, state=machine.state)
+            if log is not None and not log.turn(given, command):
+                teller.put(f"{now - begin:8.3f} s  log: {log.failure}; nothing more is logged")
+                log = None
+            kept[:, turns % KEPT_TIMES] = clock.late, time.perf_counter() - started
+            turns += 1
+            if leaving is not None and now - leaving >= FINAL_DAMPING:
+                break
+        times = Times(*kept[:, :turns])
+        if log is not None:
+            log.add("timing", now, text=str(times))
+        return times
+
+
+@contextlib.contextmanager
+def _damping_after_errors(bus: "DdsBus", machine: Machine) -> Iterator[None]:
+    try:
+        yield
+    except BaseException:
+        for _ in range(round(FINAL_DAMPING / PERIOD)):
+            bus.publish(machine.damp())
+            time.sleep(PERIOD)
+        raise
 
 
 class Teller:
@@ -169,48 +207,3 @@ class Teller:
     def __exit__(self, *exception: object) -> None:
         self._lines.put(None)
         self._thread.join(FINAL_DAMPING)
-
-
-def _driven(
-    bus: "DdsBus",
-    machine: Machine,
-    operator: Operator,
-    clock: Clock,
-    seconds: float,
-    log: LogWriter | None,
-    tell: Callable[[str], None],
-    stopped: Callable[[], bool],
-) -> Times:
-    kept = np.full((2, KEPT_TIMES), np.nan, np.float32)  # allocated in advance
-    turns = 0
-    begin: float | None = None
-    leaving: float | None = None
-    while True:
-        now, states = clock.turn(bus)
-        started = time.perf_counter()
-        others = len(bus.take(messages.LOW_COMMAND))
-        begin = now if begin is None else begin
-        wanted = operator.wanted(now, states[-1] if states else machine.sensors.state)
-        if leaving is None and (stopped() or now - begin >= seconds):
-            leaving = now
-        if leaving is not None:
-            wanted = replace(wanted, request=State.DAMPING)
-        batteries = bus.take(messages.BATTERY_STATE)
-        charge = float(batteries[-1]["soc"]) if batteries else None
-        given = CycleInputs(now, states, wanted, others, charge)
-        command = machine.turn(given)
-        bus.publish(command)
-        for event in machine.events:
-            tell(f"{now - begin:8.3f} s  {event}")
-            if log is not None:
-                log.add("event", now, text=event, state=machine.state)
-        if log is not None and not log.turn(given, command):
-            tell(f"{now - begin:8.3f} s  log: {log.failure}; nothing more is logged")
-            log = None
-        kept[:, turns % KEPT_TIMES] = clock.late, time.perf_counter() - started
-        turns += 1
-        if leaving is not None and now - leaving >= FINAL_DAMPING:
-            times = Times(*kept[:, :turns])
-            if log is not None:
-                log.add("timing", now, text=str(times))
-            return times

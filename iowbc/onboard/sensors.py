@@ -88,8 +88,7 @@ class Sensors:
             found = posture(state, self._joints)
             if np.isfinite(found.yaw):
                 last, self._yaw = self._yaw, found.yaw
-                turned = found.yaw if last is None else (found.yaw - last + np.pi) % (2.0 * np.pi) - np.pi
-                self.heading += float(turned)
+                self.heading += found.yaw if last is None else float(rotations.wrapped(np.asarray(found.yaw - last)))
             self.state, self.posture, self.at = state, found, now
             offset = now - 1e-3 * float(state["tick"])
             self._least = min(self._least + CLOCK_DRIFT * (now - self._least_at), offset)

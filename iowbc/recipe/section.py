@@ -9,15 +9,7 @@ import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    ConfigDict,
-    Field,
-    GetJsonSchemaHandler,
-    PositiveFloat,
-    model_validator,
-)
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, GetJsonSchemaHandler, PositiveFloat, model_validator
 from pydantic.fields import FieldInfo
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
@@ -129,10 +121,7 @@ class Interval(Section):
 
 
 class NamedEntries(Section):
-    """Mapping of names to entries of one type: built-in entries are fields, and a recipe may add custom ones.
-
-    The type of custom entries is the annotation of `__pydantic_extra__`.
-    """
+    """Mapping of names to entries: fields, and custom ones of the type that annotates `__pydantic_extra__`."""
 
     model_config = ConfigDict(extra="allow")
 
@@ -176,22 +165,17 @@ class Encoder(Section):
 def sentences(section: type[BaseModel]) -> dict[str, str]:
     """Attribute docstrings of a section and its bases, by field name.
 
-    They are read on demand: pydantic's `use_attribute_docstrings` reads every section's source whenever a command
-    starts.
+    Read on demand: pydantic's `use_attribute_docstrings` reads every section's source whenever a command starts.
     """
     bases = [base for base in section.__bases__ if issubclass(base, BaseModel) and base is not BaseModel]
     (definition,) = ast.parse(textwrap.dedent(inspect.getsource(section))).body
     assert isinstance(definition, ast.ClassDef)
-    own = {
-        field.target.id: inspect.cleandoc(text.value.value)
-        for field, text in itertools.pairwise(definition.body)
-        if isinstance(field, ast.AnnAssign)
-        and isinstance(field.target, ast.Name)
-        and isinstance(text, ast.Expr)
-        and isinstance(text.value, ast.Constant)
-        and isinstance(text.value.value, str)
-    }
-    return {name: sentence for base in bases for name, sentence in sentences(base).items()} | own
+    found = {name: sentence for base in bases for name, sentence in sentences(base).items()}
+    for pair in itertools.pairwise(definition.body):
+        match pair:
+            case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(value=ast.Constant(value=str(text))):
+                found[name] = inspect.cleandoc(text)
+    return found
 
 
 class InconsistentValues(ValueError):
@@ -203,8 +187,7 @@ class InconsistentValues(ValueError):
 
 
 def deciding(section: Section) -> dict[str, Any]:
-    """The values of a section that enter its key, as JSON data. At every depth, COSMETIC fields, LATER fields at their
-    default and idle entries are left out."""
+    """Values of a section's key, as JSON data: no COSMETIC fields, LATER fields at their default, or idle entries."""
     return _deciding(section, section.model_dump(mode="json"))
 
 

@@ -122,12 +122,7 @@ class Sweep:
         return tuple(self.points[0].settings)
 
 
-def load_sweep(
-    word: str,
-    settings: Sequence[str],
-    file: Path | None = None,
-    most: int = MOST_POINTS,
-) -> Sweep:
+def load_sweep(word: str, settings: Sequence[str], file: Path | None = None, most: int = MOST_POINTS) -> Sweep:
     """The points of a sweep, all of them valid recipes. Raises `RecipeError`.
 
     settings: `path=value` holds for all points; `path=a,b` and `path=0..4` vary it. They override the file, and of

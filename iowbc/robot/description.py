@@ -148,11 +148,9 @@ def _described(folder: Path, entries: Any) -> Robot:
     default = np.array([side_sign(row, name) * float(row["default"]) for row, name in zip(rows, joints, strict=True)])
     lower = np.array([hinge.lower for hinge in hinges])
     upper = np.array([hinge.upper for hinge in hinges])
-    for index, name in enumerate(joints):
-        if not lower[index] <= default[index] <= upper[index]:
-            raise ValueError(
-                f"default position {default[index]} of {name} is outside its range {lower[index]} to {upper[index]} rad"
-            )
+    for name, low, value, high in zip(joints, lower, default, upper, strict=True):
+        if not low <= value <= high:
+            raise ValueError(f"default position {value} of {name} is outside its range {low} to {high} rad")
     scales = [rows[index].get("scale") for index in support]
     if None in scales:
         raise ValueError(f"joints: support joint {joints[support[scales.index(None)]]} has no `scale`")

@@ -94,6 +94,5 @@ def interaction_mirror(robot: Robot) -> MirrorMap:
 
 
 def _restricted(whole: MirrorMap, branch: Indices) -> MirrorMap:
-    place = {int(joint): index for index, joint in enumerate(branch)}
-    permutation = np.array([place[int(whole.permutation[joint])] for joint in branch])
-    return MirrorMap(permutation, whole.sign[branch])
+    place = {joint: index for index, joint in enumerate(branch.tolist())}
+    return MirrorMap(np.array([place[joint] for joint in whole.permutation[branch].tolist()]), whole.sign[branch])

@@ -175,7 +175,8 @@ def _bodies(element: ElementTree.Element, parent: str | None, path: Path) -> Ite
     name = element.attrib.get("name")
     if name is None:
         raise ValueError(f"{path}: a body inside {parent or 'the world'!r} has no name")
-    joint, inertial = element.find("joint"), element.find("inertial")
+    joint, inertial, geoms = element.find("joint"), element.find("inertial"), element.findall("geom")
+    feet = [_numbers(geom, "pos", "0 0 0")[:2] for geom in geoms if geom.get("class") == "foot"]
     yield Body(
         name=name,
         parent=parent,
@@ -183,14 +184,8 @@ def _bodies(element: ElementTree.Element, parent: str | None, path: Path) -> Ite
         quaternion=rotations.normalized(_numbers(element, "quat", "1 0 0 0")),
         hinge=None if joint is None else _hinge(joint, path),
         sites={site.attrib["name"]: _numbers(site, "pos", "0 0 0") for site in element.findall("site")},
-        capsules=tuple(_capsule(geom) for geom in element.findall("geom") if geom.attrib.get("class") == "body"),
-        feet=np.array(
-            [
-                _numbers(geom, "pos", "0 0 0")[:2]
-                for geom in element.findall("geom")
-                if geom.attrib.get("class") == "foot"
-            ]
-        ).reshape(-1, 2),
+        capsules=tuple(_capsule(geom) for geom in geoms if geom.get("class") == "body"),
+        feet=np.array(feet).reshape(-1, 2),
         mass=0.0 if inertial is None else float(inertial.attrib["mass"]),
         centre=np.zeros(3) if inertial is None else _numbers(inertial, "pos", "0 0 0"),
     )

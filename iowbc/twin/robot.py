@@ -62,7 +62,6 @@ class Twin:
     ) -> None:
         """`recipe`: of the world; `posture`: initial, (joints,) [rad]; `fixed`: quantities that are not sampled."""
         self.robot, self.support = robot, support
-        self._kd = robot.kd
         held = {name: np.array([value]) for name, value in fixed.items()}
         self.simulation = Simulation(
             robot,
@@ -96,7 +95,7 @@ class Twin:
         enabled = motors["mode"] == 1
         kp, kd = (np.where(enabled, motors[name], 0.0).astype(np.float64) for name in ("kp", "kd"))
         if self._silent > SILENCE * FREQUENCY and kp.any():
-            kp, kd = 0.0 * kp, self._kd
+            kp, kd = 0.0 * kp, self.robot.kd
         tau, dq = (np.where(enabled, motors[name], 0.0).astype(np.float64) for name in ("tau", "dq"))
         self._drive(kp, kd, motors["q"], dq, tau)
         self.periods += 1

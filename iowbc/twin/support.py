@@ -14,7 +14,7 @@ HOOK = np.array([0.0, 0.0, 0.35])
 """Attachment of the band, torso frame [m]: between the shoulders."""
 LENGTH = 1.0
 """Length of the band from that point of a standing robot to its upper end [m]."""
-STRETCHED = {"hanging": 0.2, "lowered": 0.12, "slack": -0.2}
+HANGING, LOWERED, SLACK = 0.2, 0.12, -0.2
 """Stretch of the band with the robot at the height of standing [m]: at first its feet hang 4 cm above the ground;
 lowered, the band bears three quarters of its weight and keeps it upright."""
 LOWERING, SLACKENING = 2.0, 3.0
@@ -56,8 +56,7 @@ class Support:
         times = (0.0, LOWERING, release, release + SLACKENING)
         if self.kind != "band" or self._time > times[-1]:
             return np.zeros(3)
-        hanging, lowered, slack = STRETCHED.values()
-        stretched = np.interp(self._time, times, (hanging, lowered, lowered, slack))
+        stretched = np.interp(self._time, times, (HANGING, LOWERED, LOWERED, SLACK))
         along = np.array([0.0, 0.0, LENGTH]) - away
         distance = float(np.linalg.norm(along))
         along = along / distance

@@ -76,7 +76,7 @@ def test_its_targets_are_those_of_the_training_environment(driven: Both) -> None
 
 def test_the_robots_walked(driven: Both) -> None:
     assert (driven.exported.controller.state["phase"] > 0.0).any()
-    assert np.abs(driven.exported.controller.outputs["action"]).max() > 0.01
+    assert np.abs(driven.exported.controller.state["action"]).max() > 0.01
 
 
 def test_a_rollout_is_what_the_equations_in_float64_compute(

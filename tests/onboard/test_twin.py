@@ -20,9 +20,9 @@ from iowbc.onboard.operators import object_poses
 from iowbc.onboard.process import PERIOD
 from iowbc.onboard.ranges import Ranges
 from iowbc.sim.rendering.forces import Force
+from iowbc.twin.process import ObjectTracking
 from iowbc.twin.robot import SILENCE, Twin
 from iowbc.twin.support import Support
-from iowbc.twin.tracking import ObjectTracking
 
 pytestmark = pytest.mark.integration
 

@@ -1,5 +1,4 @@
-"""Suites of trials: mass sweeps, single cases, pushes of increasing impulse, a map of pushes, a probe of the history,
-and interaction with partners."""
+"""Suites of trials: mass sweeps, single cases, pushes, a probe of the history, and interaction with partners."""
 
 from collections.abc import Iterator
 from typing import Annotated, Literal, get_args
@@ -102,21 +101,15 @@ class HeavyCase(Case):
     """Fraction of the load that the partner bears, as in a sweep; half by default, since two carry these objects."""
 
 
+BLOCKED = Case(name="blocked crate", scene="push", mass=65.0, fixed={"resistance_scale": 50.0}, sequence=STAGNATION)
+"""Push against a crate that does not move."""
+
+
 class Stagnation(Section):
-    """Infeasible pushes (paper IV-D). Success: continued pushing in the commanded posture, on feet that do not slide;
-    E_v is expected to be large."""
+    """Infeasible pushes (paper IV-D). Success: continued pushing in the commanded posture, without sliding feet."""
 
     cases: tuple[Case, ...] = Field(
-        default=(
-            Case(
-                name="blocked crate",
-                scene="push",
-                mass=65.0,
-                fixed={"resistance_scale": 50.0, "ground_friction": 0.5},
-                sequence=STAGNATION,
-            ),
-        ),
-        min_length=1,
+        default=(BLOCKED.model_copy(update={"fixed": BLOCKED.fixed | {"ground_friction": 0.5}}),), min_length=1
     )
     """Cases of the suite. By default, a 65 kg crate with fifty times its rolling resistance resists with 638 N or more,
     whereas foot friction of 0.5, the smallest of training, allows 164 N. With higher friction, a robot in the commanded
@@ -130,8 +123,7 @@ EIGHT: tuple[Direction, ...] = get_args(Direction)
 
 
 class PushLadder(Section):
-    """Pushes on the base with increasing impulse until the robot falls. They measure the impulse survived in each
-    direction; the robot must walk afterwards."""
+    """Pushes on the base with increasing impulse until the robot falls, in each direction; it must walk afterwards."""
 
     scene: ObjectScene = "lift"
     """Scene of `simulation.scenes`."""
@@ -203,10 +195,8 @@ class PushMap(Section):
 
 
 class Probe(Section):
-    """Linear regression of the object's mass on the policy's observations, in trials with evenly spread masses.
-
-    Trials alternate between training and test set, so that no tested mass was trained on.
-    """
+    """Linear regression of the object's mass on the policy's observations; alternate trials are its training and test
+    set."""
 
     scene: ObjectScene = "lift"
     """Scene of `simulation.scenes`, with an object."""
@@ -234,8 +224,7 @@ class Probe(Section):
 
 
 class Impedance(Section):
-    """Sinusoidal forces on the centre of mass of a held object; its motion yields the mechanical impedance. The robot
-    stands and holds the object alone; afterwards it must walk."""
+    """Sinusoidal forces on an object that a standing robot holds, to measure its impedance; afterwards it must walk."""
 
     scene: ObjectScene = "lift"
     """Scene of `simulation.scenes`."""
@@ -258,8 +247,7 @@ class Impedance(Section):
 
 
 class Compliance(Section):
-    """Partners of different behaviour, a blocked crate, and sinusoidal pulls; without random impulses and pushes, so
-    that all forces are interaction forces."""
+    """Partners of different behaviour, a blocked crate, and sinusoidal pulls; without random impulses and pushes."""
 
     scene: ObjectScene = "lift"
     """Scene of `simulation.scenes`, with an object that is held."""
@@ -273,9 +261,7 @@ class Compliance(Section):
     """Trials of each case; empty: `eval.trials`."""
     sequence: tuple[Segment, ...] = ()
     """Commands; empty: those of the sweeps."""
-    blocked: Case | None = Case(
-        name="blocked crate", scene="push", mass=65.0, fixed={"resistance_scale": 50.0}, sequence=STAGNATION
-    )
+    blocked: Case | None = BLOCKED
     """Push against an immovable crate; empty: none."""
     impedance: Impedance | None = Impedance()
     """Sinusoidal pulls; empty: none."""

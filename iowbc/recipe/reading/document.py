@@ -95,12 +95,9 @@ def _limit_depth(text: str, place_of: PlaceOf) -> None:
     """Raises `RecipeError` for nesting that would overflow the stack of the C parser."""
     depth = 0
     for event in yaml.parse(text, Loader=_Loader):
-        if isinstance(event, yaml.CollectionStartEvent):
-            depth += 1
-            if depth > MAXIMUM_DEPTH:
-                raise RecipeError([Problem(place_of(event.start_mark), f"is nested more than {MAXIMUM_DEPTH} deep")])
-        elif isinstance(event, yaml.CollectionEndEvent):
-            depth -= 1
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        if depth > MAXIMUM_DEPTH:
+            raise RecipeError([Problem(place_of(event.start_mark), f"is nested more than {MAXIMUM_DEPTH} deep")])
 
 
 class _Builder:
@@ -170,38 +167,31 @@ def plain(tree: Located) -> Plain:
     return tree.value
 
 
-def located(value: object, place: str) -> Located:
+def located(value: Any, place: str) -> Located:
     """Plain data (mappings, sequences, scalars) as a tree with a single location."""
     if isinstance(value, dict):
         return Located({str(key): located(entry, place) for key, entry in value.items()}, place)
     if isinstance(value, (list, tuple)):
         return Located([located(item, place) for item in value], place)
-    if value is None or isinstance(value, (str, int, float, bool)):
-        return Located(value, place)
-    raise TypeError(f"not plain data: {value!r}")
+    return Located(value, place)
 
 
 def merged(base: Located, over: Located) -> Located:
     """`over` merged into `base`: mappings merge key by key, everything else (lists too) is replaced."""
     if not (isinstance(base.value, dict) and isinstance(over.value, dict)):
         return over
-    entries = dict(base.value)
-    for key, entry in over.value.items():
-        entries[key] = merged(entries[key], entry) if key in entries else entry
-    return Located(entries, over.place)
+    below = base.value
+    changed = {key: merged(below[key], entry) if key in below else entry for key, entry in over.value.items()}
+    return Located(below | changed, over.place)
 
 
 def leaves(tree: Located, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Located]]:
     """Every scalar and every empty collection with its path; list items are named by their index."""
-    entries: list[tuple[str, Located]] = []
-    if isinstance(tree.value, dict):
-        entries = list(tree.value.items())
-    elif isinstance(tree.value, list):
-        entries = [(str(index), item) for index, item in enumerate(tree.value)]
-    if not entries:
+    if not isinstance(tree.value, dict | list) or not tree.value:
         yield path, tree
-    for name, entry in entries:
-        yield from leaves(entry, (*path, name))
+        return
+    for name, entry in tree.value.items() if isinstance(tree.value, dict) else enumerate(tree.value):
+        yield from leaves(entry, (*path, str(name)))
 
 
 class _Dumper(getattr(yaml, "CSafeDumper", yaml.SafeDumper)):  # type: ignore[misc]

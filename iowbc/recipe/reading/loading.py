@@ -39,8 +39,7 @@ def recipe_file(word: str | Path) -> Path:
 
 
 def file_meant_in(folder: Path, word: str) -> Path:
-    """Resolve `extends`, `teacher.start` or one of `variants` in a recipe in `folder`: a file in that folder, with or
-    without extension, else as `recipe_file` does."""
+    """Resolve the name of another recipe in one in `folder`: a file in that folder, else as `recipe_file` does."""
     beside = _spelled(folder, word)
     return next(filter(os.path.isfile, (*beside, recipe_file(word))), beside[0])
 
@@ -51,8 +50,7 @@ def _spelled(folder: Path, word: str | Path) -> list[Path]:
 
 
 def known_files(inside: Path = Path()) -> Iterator[Path]:
-    """Recipes that can be named without their folder, or as `experts/NAME` for those in a folder of recipes, in order
-    of precedence."""
+    """Recipes by name (`experts/NAME` in a folder of recipes), in order of precedence."""
     for folder in FOLDERS:
         for suffix in SUFFIXES:
             yield from sorted((folder / inside).glob(f"*{suffix}"))
@@ -142,11 +140,9 @@ class LoadedRecipe:
     def place(self, path: str) -> str:
         """Location of the value at a dotted path (`file:line:column`, `--set ...`), or `default`."""
         parts = path.split(".")
-        for length in range(len(parts), 0, -1):
-            found = self.places.get(".".join(parts[:length]))
-            if found is not None:
-                return found
-        return next((place for known, place in self.places.items() if known.startswith(path + ".")), "default")
+        above = (".".join(parts[:length]) for length in range(len(parts), 0, -1))
+        below = (known for known in self.places if known.startswith(f"{path}."))
+        return next((self.places[known] for known in (*above, *below) if known in self.places), "default")
 
 
 def load_recipe(file: Path | str, overrides: Sequence[str] = ()) -> LoadedRecipe:
