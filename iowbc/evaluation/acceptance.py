@@ -138,9 +138,7 @@ def judged(recipe: Recipe, robot: Robot, asked: Acceptance, trials: list[tuple[E
 def golden_episode(recipe: Recipe) -> Episode:
     """Undisturbed episode of `export.golden_steps` steps without an object."""
     duration = recipe.export.golden_steps / recipe.task.control_frequency / len(GOLDEN_PARTS)
-    sequence = [
-        Segment.model_validate({"duration": duration, "ramp": RAMP * duration, **part}) for part in GOLDEN_PARTS
-    ]
+    sequence = [Segment(duration=duration, ramp=RAMP * duration, **part) for part in GOLDEN_PARTS]
     return planned_episode(FREE, command_script(sequence, recipe.task.commands), 0.0, recipe.seed, UNDISTURBED)
 
 

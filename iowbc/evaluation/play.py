@@ -88,16 +88,11 @@ def play(
         settings = recipe.eval.video.model_copy(update={"duration": episode.duration})
         title = f"{recipe.name}: {episode.scene}, {request.object_mass:g} kg, seed {request.seed}"
         with written_film(request.video, settings.fps) as add:
-            outcome, frames = film_episode(
-                environment,
-                policy,
-                add,
-                settings,
-                title,
-                interrupted,
-                lambda seconds: progress(seconds, episode.duration),
-            )
-        return episode, outcome, frames
+
+            def further(seconds: float) -> None:
+                progress(seconds, episode.duration)
+
+            return episode, *film_episode(environment, policy, add, settings, title, interrupted, further)
 
 
 def requested_episode(recipe: Recipe, request: PlayRequest) -> Episode:

@@ -122,9 +122,8 @@ def gathered(
     moment, trial = np.nonzero(going)
     features = {name: np.stack([seen[name] for seen in kept])[moment, trial] for name in kept[0]}
     seconds = times[moment]
-    settled = seconds >= span - EXACT
-    moments = pd.DataFrame({"trial": trial, "seconds": seconds, "settled": settled, "mass": masses[trial]})
-    return ProbeReadings(features, moments)
+    moments = {"trial": trial, "seconds": seconds, "settled": seconds >= span - EXACT, "mass": masses[trial]}
+    return ProbeReadings(features, pd.DataFrame(moments))
 
 
 def inferred_masses(readings: ProbeReadings) -> pd.DataFrame:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iowbc.pipeline.console.wording import figure
+from iowbc.pipeline.nested import flattened
 from iowbc.pipeline.store.artifact import Artifact
 from iowbc.recipe.recipe import SEEDS
 from iowbc.results.table import Cell, Column, MeanCell, Table, heads
@@ -44,8 +45,8 @@ class Group:
     @property
     def seeds(self) -> tuple[str, ...]:
         """Seed of each run's training; where seeds are equal, the labels of the runs."""
-        for own in (("skill", "learning", "seed"), ("teacher", "seed")):
-            seeds = [str(_seed(run.recipe, own)) for run in self.runs]
+        for path in ("skill.learning.seed", "teacher.seed"):
+            seeds = [str(_seed(run.recipe, path)) for run in self.runs]
             if len({*seeds}) == len(seeds):
                 return tuple(seeds)
         return tuple(run.label for run in self.runs)
@@ -114,28 +115,13 @@ def _of_one_variant(first: Run, second: Run) -> bool:
     return "eval" in shared and all(decided[0]) and decided[0] == decided[1] and labels[0] == labels[1]
 
 
-def _seed(recipe: Mapping[str, Any], path: Sequence[str]) -> int:
+def _seed(recipe: Mapping[str, Any], path: str) -> int:
     """The seed at a path, or the recipe's own where that is empty."""
-    value: Any = recipe
-    for name in path:
-        value = value.get(name) if isinstance(value, Mapping) else None
-    return int(recipe.get("seed", 0) if value is None else value)
+    own = flattened(recipe).get(path)
+    return int(recipe.get("seed", 0) if own is None else own)
 
 
 def _seedless(recipe: Mapping[str, Any]) -> dict[str, Any]:
-    """A recipe without its seeds, name, description and execution."""
-    found = {name: value for name, value in recipe.items() if name not in NAMING and name not in SEEDS}
-    for path in SEEDS:
-        head, *rest = path.split(".")
-        if rest and isinstance(found.get(head), Mapping):
-            found[head] = _without(found[head], rest)
-    return found
-
-
-def _without(section: Mapping[str, Any], path: Sequence[str]) -> dict[str, Any]:
-    """A section without the value at a path."""
-    head, *rest = path
-    if not rest:
-        return {name: value for name, value in section.items() if name != head}
-    below = section.get(head)
-    return {**section, head: _without(below, rest)} if isinstance(below, Mapping) else dict(section)
+    """The values of a recipe by dotted path, without its seeds, name, description and execution."""
+    own = {name: value for name, value in recipe.items() if name not in NAMING}
+    return {path: value for path, value in flattened(own).items() if path not in SEEDS} if own else {}

@@ -9,9 +9,8 @@ from iowbc.evaluation.paper import VARIANTS
 from iowbc.evaluation.report.statistics import design_effect, mean_half_width, wilson_interval
 from iowbc.evaluation.trials.errors import ERRORS, error_norm
 
-PARTS = ("", "_moving", "_clamped")
-"""Suffixes of the errors: over the whole trial, while stepping is commanded, against clamped commands."""
-ALL_ERRORS = tuple(f"{name}{part}" for part in PARTS for name in ERRORS)
+ALL_ERRORS = tuple(f"{name}{part}" for part in ("", "_moving", "_clamped") for name in ERRORS)
+"""The errors over the whole trial, while stepping is commanded, against clamped commands."""
 STILL = tuple(f"still_{name}{part}" for part in ("", "_moving") for name in ERRORS)
 """The errors of a robot that stands still, from the script alone."""
 OVER_ALL_TRIALS = (
@@ -20,8 +19,6 @@ OVER_ALL_TRIALS = (
 )
 """Metrics averaged over all trials, up to their end, since a robot pulls before it falls. All others are averaged over
 surviving trials."""
-RAW = ("E_v_raw", "E_v_raw_moving")
-"""E_v without averaging over a gait period; missing in trials of an early version."""
 SETTINGS = (
     *("commanded_distance", "partner_share", "rolling_resistance", "pull_frequency", "pull_direction"),
     *("height", "gait_period"),
@@ -56,7 +53,8 @@ def aggregate(trials: pd.DataFrame) -> pd.DataFrame:
     NaN if no trial survived ("Fails" in the tables), for half widths also if only one did. Metrics that trials of an
     earlier version lack are missing here, too.
     """
-    missing = [name for name in (*RAW, *OVER_ALL_TRIALS, *SETTINGS) if name not in trials]
+    of_later_versions = ("E_v_raw", "E_v_raw_moving", *OVER_ALL_TRIALS, *SETTINGS)
+    missing = [name for name in of_later_versions if name not in trials]
     trials = with_trainings(trials).assign(**dict.fromkeys(missing, np.nan))
     numbers = [name for name in trials.select_dtypes("float") if name not in (*GROUP, *SETTINGS)]
     metrics = [name for name in numbers if not name.startswith("drawn_")]

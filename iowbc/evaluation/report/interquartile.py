@@ -26,7 +26,7 @@ FIGURES = ("success", *ERRORS, "norm")
 """Metrics of a trial."""
 
 Values = NDArray[np.float64]
-Block = Mapping[str, Values]
+Block = dict[str, Values]
 """Trials of a variant in one suite, by training seed: (masses or cases, trials, metrics in order of `FIGURES`). Errors
 are infinite if the trial was not survived."""
 
@@ -76,14 +76,11 @@ def blocks(trials: pd.DataFrame) -> dict[str, Block]:
     trials = trials.assign(success=trials["succeeded"].astype(float))
     trials[list(ERRORS)] = trials[list(ERRORS)].where(trials["survived"], np.inf)
     trials["norm"] = error_norm(trials[list(ERRORS)].to_numpy(np.float64))
-    groups = {
-        (str(variant), str(training)): own.groupby(["case", "mass"])
-        for (variant, training), own in trials.groupby(["variant", TRAINING], sort=False)
-    }
-    found: dict[str, dict[str, Values]] = {variant: {} for variant in variants_of(trials)}
-    for (variant, training), own in groups.items():
-        found[variant][training] = np.array([part[list(FIGURES)].to_numpy(np.float64) for _, part in own])
-    return dict(found)
+    found: dict[str, Block] = {variant: {} for variant in variants_of(trials)}
+    for (variant, training), own in trials.groupby(["variant", TRAINING], sort=False):
+        cells = [cell[list(FIGURES)].to_numpy(np.float64) for _, cell in own.groupby(["case", "mass"])]
+        found[variant][str(training)] = np.array(cells)
+    return found
 
 
 def common_rows(trials: pd.DataFrame) -> pd.DataFrame:

@@ -44,10 +44,9 @@ def impedance_metrics(trace: Trace, pull: PlannedPull | None) -> dict[str, float
     """
     value = complex(np.nan, np.nan)
     if pull is not None:
-        first, last = (
-            round(time / trace.dt) for time in (pull.begin + 1.0 / pull.frequency, pull.begin + pull.duration)
-        )
-        if last - first >= round(1.0 / pull.frequency / trace.dt) and len(trace) >= last:
+        period = 1.0 / pull.frequency
+        first, last = (round((pull.begin + time) / trace.dt) for time in (period, pull.duration))
+        if last - first >= round(period / trace.dt) and len(trace) >= last:
             yaw, (forward, left) = trace.heading_reference[first], pull.force
             along = np.array([np.cos(yaw) * forward - np.sin(yaw) * left, np.sin(yaw) * forward + np.cos(yaw) * left])
             along /= np.linalg.norm(along)

@@ -48,7 +48,7 @@ def trial_metrics(recipe: Recipe, robot: Robot, episode: Episode, outcome: Outco
     directions, length = commanded_path(whole, errors.start_heading(trace), trace.dt)
     path = errors.moving_average(trace.base_position[:, :2], window)
     walked = float(np.sum(np.linalg.norm(np.diff(path, axis=0), axis=1)))
-    has_object = bool(np.any(trace.object_position))
+    object_position = trace.object_position if np.any(trace.object_position) else np.full((len(trace), 3), np.nan)
     still_errors = still.means() | still.means("_moving", wants_to_move(whole, gait))
     return {
         **deviations.means(),
@@ -59,10 +59,8 @@ def trial_metrics(recipe: Recipe, robot: Robot, episode: Episode, outcome: Outco
         "E_v_raw_moving": float(np.mean(raw[moving])) if moving.any() else np.nan,
         "commanded_distance": length,
         "transport_robot": covered(trace.base_position, directions, length),
-        "transport_object": covered(trace.object_position, directions, length) if has_object else np.nan,
-        "object_beside": beside(trace.base_position, trace.heading, trace.object_position, moving)
-        if has_object
-        else np.nan,
+        "transport_object": covered(object_position, directions, length),
+        "object_beside": beside(trace.base_position, trace.heading, object_position, moving),
         "distance": walked,
         **foot_metrics(trace, asked.foot_load, walked),
         **ground_metrics(trace, asked.foot_load, friction),

@@ -55,21 +55,12 @@ class Trial:
 
 def command_script(sequence: Sequence[Segment], commands: Commands) -> CommandScript:
     """A recipe's command sequence as the 11-D commands over time."""
-    return CommandScript(
-        tuple(
-            CommandSegment(
-                duration=segment.duration,
-                ramp=segment.ramp,
-                command=(
-                    *segment.velocity,
-                    commands.nominal_height if segment.height is None else segment.height,
-                    segment.pitch,
-                    *segment.wrists,
-                ),
-            )
-            for segment in sequence
-        )
-    )
+
+    def at_end(segment: Segment) -> tuple[float, ...]:
+        height = commands.nominal_height if segment.height is None else segment.height
+        return (*segment.velocity, height, segment.pitch, *segment.wrists)
+
+    return CommandScript(tuple(CommandSegment(one.duration, at_end(one), one.ramp) for one in sequence))
 
 
 def sequence_for(recipe: Recipe, scene: str, own: Sequence[Segment] = ()) -> tuple[Segment, ...]:
@@ -188,8 +179,7 @@ class PlannedSweep:
         """The trials at given masses [kg]; `case`: default the name of the suite."""
         place, own = (self.kind, self.suite, case or self.suite), self.sweep
         fixed = held_fixed(self.partner_share, own.rolling_resistance, disturbed=self.disturbed) | own.fixed
-        cells = (_cell(self.recipe, place, own.scene, mass, fixed, own.sequence) for mass in masses)
-        return list(itertools.chain.from_iterable(cells))
+        return [trial for mass in masses for trial in _cell(self.recipe, place, own.scene, mass, fixed, own.sequence)]
 
     def heavier(self, last: float) -> float | None:
         """Next mass beyond the end of the sweep [kg], or None at the recipe's limit."""
@@ -237,13 +227,11 @@ def push_trials(recipe: Recipe) -> Iterator[Trial]:
     for words, ladder in ladders.items():
         if ladder is None:
             continue
-        for direction in ladder.directions:
+        for direction, impulse in itertools.product(ladder.directions, ladder.impulses):
             forward, left = DIRECTIONS[direction]
-            place = ("pushes", "pushes", f"{direction}{words}")
-            for impulse in ladder.impulses:
-                push = PlannedPush(ladder.time, ladder.duration, (impulse * forward, impulse * left))
-                cell = (recipe, place, ladder.scene, ladder.mass, fixed, ladder.sequence)
-                yield from _cell(*cell, trials=ladder.trials, push=push, impulse=impulse)
+            push = PlannedPush(ladder.time, ladder.duration, (impulse * forward, impulse * left))
+            cell = (recipe, ("pushes", "pushes", f"{direction}{words}"), ladder.scene, ladder.mass, fixed)
+            yield from _cell(*cell, ladder.sequence, trials=ladder.trials, push=push, impulse=impulse)
 
 
 def compliance_trials(recipe: Recipe) -> Iterator[Trial]:

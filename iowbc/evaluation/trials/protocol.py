@@ -2,21 +2,14 @@
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from io import BytesIO
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from iowbc.evaluation.trials.plan import (
-    Trial,
-    case_trials,
-    compliance_trials,
-    map_trials,
-    planned_sweeps,
-    push_trials,
-)
+from iowbc.evaluation.trials.plan import Trial, case_trials, compliance_trials, map_trials, planned_sweeps, push_trials
 from iowbc.evaluation.trials.rollout import PolicyInBatch, play_episodes
 from iowbc.evaluation.trials.table import trial_row
 from iowbc.files import newest_checked, write_checked
@@ -84,30 +77,24 @@ Batches = Mapping[str, Sequence[Trial]]
 """Trials of each batch, by name of the batch."""
 
 
+@dataclass
 class Protocol:
     """Plays the trials of a recipe's `eval` section; finished batches are cached in `work`.
 
     First come all trials of the recipe, then, one mass per round, those beyond the end of sweeps that still succeed.
     """
 
-    def __init__(
-        self,
-        world: Specification,
-        policy: Policy,
-        *,
-        work: Path,
-        workers: int,
-        interrupted: Callable[[], bool] = lambda: False,
-        progress: Callable[[float, float, str], None] = lambda done, total, note: None,
-        elsewhere: Callable[[Batches], Iterator[tuple[str, bytes]]] | None = None,
-    ) -> None:
-        """`progress` receives the trials done, the trials planned so far, and a note. `elsewhere` plays batches on
-        other machines and yields the name and the result of `played` of each."""
-        self.world, self.policy = world, policy
-        self.work, self.workers = work, workers
-        self.interrupted, self.progress = interrupted, progress
-        self.elsewhere = elsewhere
-        self.done, self.total = 0, 0
+    world: Specification
+    policy: Policy
+    work: Path
+    workers: int
+    interrupted: Callable[[], bool] = lambda: False
+    progress: Callable[[float, float, str], None] = lambda done, total, note: None
+    """Receives the trials done, the trials planned so far, and a note."""
+    elsewhere: Callable[[Batches], Iterator[tuple[str, bytes]]] | None = None
+    """Plays batches on other machines and yields the name and the result of `played` of each."""
+    done: int = 0
+    total: int = 0
 
     def run(self) -> pd.DataFrame:
         """All trials, one row each: the table of `trials.parquet`. Raises Interrupted when interrupted."""

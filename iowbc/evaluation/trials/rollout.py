@@ -61,8 +61,7 @@ def play_in(
     policy.reset(np.ones(count, np.bool_))
     frames: list[dict[str, Array]] = []
     length = np.zeros(count, np.int64)
-    endings = {name: np.zeros(count, np.bool_) for name in ("fallen", "dropped")}
-    finished = np.zeros(count, np.bool_)
+    endings: dict[int, dict[str, bool]] = {}
     look(0.0)
     while not length.all():
         if len(frames) % INTERRUPT_CHECK_INTERVAL == 0:
@@ -75,12 +74,10 @@ def play_in(
         frames.append({name: np.array(environment.signals[name], np.float64) for name in RECORDED})
         if not (length[0] or done[0]):
             look(len(frames) * dt)
-        ends = done & (length == 0)
-        length[ends] = len(frames)
-        for name, flags in endings.items():
-            flags[ends] = environment.signals[name].reshape(count)[ends] > 0
-        for index in np.flatnonzero(ends):
-            finished[index] = bool(infos[index].get("TimeLimit.truncated", False))
+        for index in np.flatnonzero(done & (length == 0)).tolist():
+            length[index] = len(frames)
+            endings[index] = {name: environment.signals[name].flat[index] > 0 for name in ("fallen", "dropped")}
+            endings[index]["finished"] = infos[index].get("TimeLimit.truncated", False)
         if done.any():
             policy.reset(done)
     recorded = {name: np.stack([frame[name].reshape(count, -1) for frame in frames]) for name in RECORDED}
@@ -88,10 +85,8 @@ def play_in(
         Outcome(
             trace=trace_of(recorded, index, int(length[index]), dt),
             seconds=float(length[index] * dt),
-            fallen=bool(endings["fallen"][index]),
-            dropped=bool(endings["dropped"][index]),
-            finished=bool(finished[index]),
             drawn={name: values[index] for name, values in drawn.items()},
+            **{name: bool(flag) for name, flag in endings[index].items()},
         )
         for index in range(count)
     ]

@@ -15,11 +15,9 @@ def commanded_path(given: Array, heading: float, dt: float) -> tuple[Array, floa
     given: commands (T, 11); heading: of the robot at the start [rad].
     """
     yaw = heading + dt * np.cumsum(given[:, YAW_RATE])
-    speed = np.hypot(given[:, 0], given[:, 1])
-    turned = np.stack(
-        [np.cos(yaw) * given[:, 0] - np.sin(yaw) * given[:, 1], np.sin(yaw) * given[:, 0] + np.cos(yaw) * given[:, 1]],
-        axis=1,
-    )
+    (forward, left), cosine, sine = given[:, :2].T, np.cos(yaw), np.sin(yaw)
+    speed = np.hypot(forward, left)
+    turned = np.stack([cosine * forward - sine * left, sine * forward + cosine * left], axis=1)
     directions = np.divide(turned, speed[:, None], out=np.zeros_like(turned), where=speed[:, None] > 0)
     return directions, float(speed.sum() * dt)
 
