@@ -20,7 +20,7 @@ from local_nodes import connected_nodes
 from iowbc.benchmarks.standing_generator import generator_of
 from iowbc.evaluation.trials.plan import Trial, planned_sweeps
 from iowbc.evaluation.trials.protocol import Batches
-from iowbc.learning.as_numpy import teacher_policy
+from iowbc.learning.as_numpy import numpy_policy
 from iowbc.learning.networks import TeacherNetwork
 from iowbc.learning.storage import load_teacher, save_network
 from iowbc.pipeline.store.digests import folder_files
@@ -33,8 +33,7 @@ from iowbc.rollouts.blocks import block_size
 from iowbc.rollouts.rollout_policies import ExploringPolicy
 from iowbc.stages.environments import RemoteWorkers
 from iowbc.stages.eval import play_everywhere
-from iowbc.stages.label_everywhere import SHARES, label_everywhere
-from iowbc.stages.rg_dataset import CHUNK
+from iowbc.stages.rg_dataset import CHUNK, SHARES, label_everywhere
 from iowbc.task.layout import full_layout
 from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv
@@ -192,7 +191,7 @@ def _rolled(spread: "NodeSpread", world: Workload, nodes: int) -> tuple[Throughp
     """How fast a training's rollouts are made, one actor on each node; and the bytes of an update, of one actor."""
     recipe, count = world.recipe, ENVIRONMENTS * nodes
     specification = Specification(recipe, world.folders["robot"], world.folders["generator"])
-    policy = teacher_policy(load_teacher(world.folders["policy"])[0])
+    policy = numpy_policy(load_teacher(world.folders["policy"])[0])
     environments = VectorEnv(specification, num_envs=count, workers=partial(RemoteWorkers, spread, nodes), seed=0)
     with closing(environments):
         environments.reset()

@@ -98,9 +98,7 @@ def unfinished_policy(path: Path, key: str, settings: Teacher, mirrors: Mirrors)
         except Damaged:
             continue
         if content is not None:
-            return policy_of(
-                *trained_network(
-                    {**under("policy", (saved := load(content))), **under("average", saved)}, settings, mirrors
-                )
-            )
+            saved = load(content)
+            weights = under("policy", saved) | under("average", saved)
+            return policy_of(*trained_network(weights, settings, mirrors))
     raise Damaged(f"{path}: no whole checkpoint of this training")

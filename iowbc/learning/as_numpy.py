@@ -20,17 +20,14 @@ def acting_policy(policy: ActorCritic) -> RowPolicy | HistoryPolicy:
     normalizer, actor = policy.normalizer, policy.actor
     if isinstance(actor, HistoryActor):
         return _history_policy(actor.network, _normal(normalizer, actor.observation))
-    return RowPolicy(_normal(normalizer), layers_of(actor))
+    return RowPolicy(_normal(normalizer), _layers(actor))
 
 
 def numpy_policy(network: TeacherNetwork | StudentNetwork) -> RowPolicy | HistoryPolicy:
     """NumPy policy of a teacher or a student."""
-    return teacher_policy(network) if isinstance(network, TeacherNetwork) else student_policy(network)
-
-
-def teacher_policy(network: TeacherNetwork) -> RowPolicy:
-    """NumPy policy of a teacher."""
-    return RowPolicy(_normal(network.normalizer), layers_of(network.body))
+    if isinstance(network, StudentNetwork):
+        return student_policy(network)
+    return RowPolicy(_normal(network.normalizer), _layers(network.body))
 
 
 def student_policy(network: StudentNetwork) -> HistoryPolicy:
@@ -39,7 +36,7 @@ def student_policy(network: StudentNetwork) -> HistoryPolicy:
 
 
 @torch.no_grad()
-def layers_of(network: nn.Module) -> Layers:
+def _layers(network: nn.Module) -> Layers:
     """Layers of a perceptron. Those of a symmetric one act on units (a, b) instead of sums and differences.
 
     A symmetric layer computes E·(a + b) and O·(a - b). Its output units are the activations of their sum,
@@ -94,7 +91,7 @@ def _history_policy(network: StudentNetwork, normal: Normal) -> HistoryPolicy:
     if network.estimate is not None:
         head = network.estimate.head
         estimate = _head(head) if isinstance(head, SymmetricHead) else _linear(head)
-    return HistoryPolicy(normal, encoder, estimate, layers_of(network.body))
+    return HistoryPolicy(normal, encoder, estimate, _layers(network.body))
 
 
 def _linear(layer: nn.Linear) -> Linear:

@@ -68,25 +68,11 @@ class Best:
         self.rollbacks, self.low = arrays["rollbacks"].tolist()
 
 
-class PolicyAverage:
-    """Exponentially weighted mean of weights and standard deviations."""
-
-    def __init__(self, policy: nn.Module, half_life: float) -> None:
-        """`half_life`: number of updates after which the weight of a policy in the mean has halved."""
-        self.newest = 1.0 - 0.5 ** (1.0 / half_life)
-        """Weight of the newest policy."""
-        self.arrays: Arrays = acting_part(module_arrays(policy))
-
-    def take(self, policy: nn.Module) -> None:
-        """Update the mean with the newest policy."""
-        newest = acting_part(module_arrays(policy))
-        self.arrays = {
-            name: mean + np.float32(self.newest) * (newest[name] - mean) for name, mean in self.arrays.items()
-        }
-
-    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Restore the mean from a checkpoint."""
-        self.arrays = acting_part(arrays)
+def averaged(means: Arrays, policy: nn.Module, half_life: float) -> Arrays:
+    """Exponentially weighted means of the acting parts of policies, updated with the newest one. `half_life`: number of
+    updates after which the weight of a policy has halved."""
+    newest, weight = acting_part(module_arrays(policy)), np.float32(1.0 - 0.5 ** (1.0 / half_life))
+    return {name: mean + weight * (newest[name] - mean) for name, mean in means.items()}
 
 
 def acting_part(arrays: Mapping[str, NDArray[Any]]) -> Arrays:

@@ -64,13 +64,3 @@ def restore_optimizer(optimizer: torch.optim.Optimizer, arrays: Mapping[str, NDA
         number, field = name.split(".", 1)
         moments.setdefault(int(number), {})[field] = torch.from_numpy(np.array(value))
     optimizer.load_state_dict({"state": moments, "param_groups": optimizer.state_dict()["param_groups"]})
-
-
-def random_arrays() -> Arrays:
-    """State of torch's global generator, from which the learners draw."""
-    return {"torch": torch.get_rng_state().numpy()}
-
-
-def restore_random(arrays: Mapping[str, NDArray[Any]]) -> None:
-    """Inverse of `random_arrays`."""
-    torch.set_rng_state(torch.from_numpy(np.array(arrays["torch"])))

@@ -5,12 +5,13 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 
 from iowbc.errors import StageFailed
 from iowbc.learning import checkpoint
 from iowbc.learning.acting import Policy, policy_of
-from iowbc.learning.best import Best, PolicyAverage
+from iowbc.learning.best import Best, acting_part, averaged
 from iowbc.learning.checkpoint import Arrays, prefixed, under
 from iowbc.learning.environments import Environments
 from iowbc.learning.networks import Mirrors
@@ -52,11 +53,12 @@ class TeacherTraining:
         """Environment steps of the whole training; the last update may exceed them."""
         self.score = score if settings.check.every is not None else None
         self.say = say
+        self._steps_an_update = settings.environments * settings.rollout
         self.model = Learner(settings, environments, seed, mirrors, cores, value_only, device)
-        self.average: PolicyAverage | None = None
+        self.average: Arrays = {}
+        """Running average of the policies' acting parts; empty unless the recipe wants one."""
         if settings.average_half_life is not None:
-            updates = settings.average_half_life / (settings.environments * settings.rollout)
-            self.average = PolicyAverage(self.model.policy, updates)
+            self.average = acting_part(checkpoint.module_arrays(self.model.policy))
         self.best = Best(settings.check, self._learner_state())
 
     @property
@@ -75,8 +77,9 @@ class TeacherTraining:
         model.restart_exploration()
         model.collect()
         training = model.train()
-        if self.average is not None:
-            self.average.take(model.policy)
+        if self.settings.average_half_life is not None:
+            updates = self.settings.average_half_life / self._steps_an_update
+            self.average = averaged(self.average, model.policy, updates)
         figures = self.environments.statistics() | self._judged(training)
         seconds = {f"seconds/{part}": spent for part, spent in model.seconds.items()}
         rest = time.perf_counter() - begin - sum(seconds.values())
@@ -86,7 +89,7 @@ class TeacherTraining:
         """Finite statistics of an update and its check; rolls back if they show a collapse."""
         figures = {name: value for name, value in training.items() if np.isfinite(value)}
         deviation, floor = self.model.policy.log_std.detach().exp(), self.settings.std_floor
-        updates = self.steps // (self.settings.environments * self.settings.rollout)
+        updates = self.steps // self._steps_an_update
         why = ""
         if len(figures) < len(training) or not self.model.policy.finite():
             why = "the networks diverged"
@@ -122,7 +125,7 @@ class TeacherTraining:
 
     def _acting(self) -> Arrays:
         """Parameters and buffers of the policy; its actor is the running average of policies if there is one."""
-        return checkpoint.module_arrays(self.model.policy) | ({} if self.average is None else self.average.arrays)
+        return checkpoint.module_arrays(self.model.policy) | self.average
 
     def _scored(self) -> Arrays:
         """State of the learner with the policy of `_acting`, which checks score."""
@@ -130,8 +133,8 @@ class TeacherTraining:
 
     def _restore_learner(self, learnt: Mapping[str, NDArray[Any]]) -> None:
         """Inverse of `_learner_state`."""
-        if self.average is not None:
-            self.average.restore(under("policy", learnt))
+        if self.average:
+            self.average = acting_part(under("policy", learnt))
         checkpoint.restore_module(self.model.policy, under("policy", learnt))
         checkpoint.restore_optimizer(self.model.policy.optimizer, under("optimizer", learnt))
         self.model.normalization.restore(under("normalization", learnt))
@@ -143,12 +146,12 @@ class TeacherTraining:
         return {
             **self._learner_state(),
             **prefixed("best", self.best.arrays()),
-            **prefixed("random", checkpoint.random_arrays()),
+            "random/torch": torch.get_rng_state().numpy(),
             **prefixed("environment", self.environments.state()),
             "observation": np.array(model.observation),
             "counters": np.array([model.steps]),
             "learning_rate": np.array([model.learning_rate]),
-            **({} if self.average is None else prefixed("average", self.average.arrays)),
+            **prefixed("average", self.average),
         }
 
     def begin(self, network: Network) -> None:
@@ -166,8 +169,8 @@ class TeacherTraining:
             raise StageFailed(f"{path}: that policy's networks are other ones; {names} say which") from error
         model.normalization.inherited = network.normalizer.mean.numpy(), network.normalizer.std.numpy()
         model.normalization.move(model.policy.normalizer)
-        if self.average is not None:
-            self.average.restore(checkpoint.module_arrays(model.policy))
+        if self.average:
+            self.average = acting_part(checkpoint.module_arrays(model.policy))
         model.value_alone = self.settings.value_first
         if self.settings.desired_kl is not None:
             model.learning_rate = min(self.settings.learning_rate_range)
@@ -177,14 +180,14 @@ class TeacherTraining:
         """Inverse of `arrays`, for a training with the same recipe."""
         model = self.model
         self._restore_learner(arrays)
-        if self.average is not None:
-            self.average.restore(under("average", arrays))
+        if self.average:
+            self.average = under("average", arrays)
         self.best.restore(under("best", arrays))
         self.environments.restore(under("environment", arrays))
         model.observation = np.array(arrays["observation"])
         model.steps = int(arrays["counters"][0])
         model.learning_rate = float(arrays["learning_rate"][0])
-        checkpoint.restore_random(under("random", arrays))
+        torch.set_rng_state(torch.from_numpy(np.array(arrays["random/torch"])))
 
     def network(self) -> tuple[Network, dict[str, Any]]:
         """The deterministic policy with its normalisation, and the arguments that rebuild it."""

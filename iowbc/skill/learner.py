@@ -8,7 +8,6 @@ import torch
 from torch import Tensor
 
 from iowbc.arrays import Array, Indices
-from iowbc.learning import checkpoint
 from iowbc.learning.checkpoint import Arrays, prefixed, under
 from iowbc.learning.gaussian import divergence, entropy, log_density
 from iowbc.learning.policy import VALUE_GAIN
@@ -236,7 +235,7 @@ class SkillTraining:
 
     def arrays(self) -> Arrays:
         """Training state for resuming, between two updates."""
-        whole: Arrays = {"steps": np.array([self.steps]), **prefixed("random", checkpoint.random_arrays())}
+        whole: Arrays = {"steps": np.array([self.steps]), "random/torch": torch.get_rng_state().numpy()}
         whole |= prefixed("imitated", {name: values.numpy() for name, values in self.imitated.items()})
         for name, each in self.trained.items():
             whole |= prefixed(name, each.arrays())
@@ -247,7 +246,7 @@ class SkillTraining:
             each.restore(under(name, arrays))
         self.steps = int(arrays["steps"][0])
         self.imitated = {name: torch.from_numpy(np.array(of)) for name, of in under("imitated", arrays).items()}
-        checkpoint.restore_random(under("random", arrays))
+        torch.set_rng_state(torch.from_numpy(np.array(arrays["random/torch"])))
 
 
 def _of_episodes(ended: Sequence[Mapping[str, Array]]) -> dict[str, float]:

@@ -1,21 +1,27 @@
 """Stage rg-dataset: labels arm postures and base commands with support postures, and checks them in two ways."""
 
+import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
 
 from iowbc.errors import StageFailed
 from iowbc.pipeline.stage import Job, Stage
-from iowbc.stages.label_everywhere import label_everywhere
 
 if TYPE_CHECKING:
+    from iowbc.pipeline.cluster.spread import NodeSpread
+    from iowbc.reference.labels.labelling import LabelTask
     from iowbc.reference.labels.shards import Shard
 
 LABELLED = "labelled.npz"
 """Map of commands with labels; `feasible.npz` of rg-fit is its part without jumps of the network."""
 CHUNK = {"static": 256, "ocp": 8}
 """Samples in a shard: one to three seconds of work, which is what an interruption or a crash costs."""
+SHARES = 4
+"""Pieces per core on other machines, so that cores idle for at most a quarter of the time at the end."""
 
 
 def run(job: Job) -> None:
@@ -40,23 +46,23 @@ def run(job: Job) -> None:
     if wrong := [f"{path}: {text}" for path, text in wrong_ranges(robot, recipe)]:
         raise StageFailed("; ".join(wrong))
     plan = SamplePlan(robot, recipe, seed)
-    began = time.monotonic()
-
-    def progress(done: int, total: int) -> None:
-        job.report.progress(done, total, f"{recipe.method} labels")
-
     label: Callable[..., Shard] = partial(label_all, workers=job.workers)
     if job.spread is not None:
         label = partial(label_everywhere, spread=job.spread)
-    result = label(
-        LabelTask(job.robot, recipe, seed, recipe.method),
-        range(plan.count),
-        folder=job.work / "shards",
-        key=job.key,
-        chunk_size=CHUNK[recipe.method],
-        interrupted=job.interrupted,
-        progress=progress,
-    )
+
+    def labelled(indices: Sequence[int], method: Literal["static", "ocp"], folder: str, note: str) -> "Shard":
+        return label(
+            LabelTask(job.robot, recipe, seed, method),
+            indices,
+            folder=job.work / folder,
+            key=job.key,
+            chunk_size=CHUNK[method],
+            interrupted=job.interrupted,
+            progress=lambda done, total: job.report.progress(done, total, note),
+        )
+
+    began = time.monotonic()
+    result = labelled(range(plan.count), recipe.method, "shards", f"{recipe.method} labels")
     seconds = time.monotonic() - began
     try:
         dataset = assemble(plan, result)
@@ -67,16 +73,7 @@ def run(job: Job) -> None:
     check = None
     if chosen:
         job.report.say(f"checks {len(chosen)} labels against the optimal control problem")
-        again = label(
-            LabelTask(job.robot, recipe, seed, "ocp"),
-            chosen,
-            folder=job.work / "crosscheck",
-            key=job.key,
-            chunk_size=CHUNK["ocp"],
-            interrupted=job.interrupted,
-            progress=lambda done, total: job.report.progress(done, total, "optimal control"),
-        )
-        check = compare_methods(dataset, again)
+        check = compare_methods(dataset, labelled(chosen, "ocp", "crosscheck", "optimal control"))
 
     metrics = {
         "samples": float(plan.count),
@@ -113,6 +110,66 @@ def run(job: Job) -> None:
             f"(p90 of {len(check.difference)} samples, the limit is {recipe.crosscheck.p90_limit} rad). "
             f"Worst: {'; '.join(check.worst)}. Check the weights in rg.problem, or label with `rg.method: ocp`"
         )
+
+
+def label_everywhere(
+    task: "LabelTask",
+    indices: Sequence[int],
+    *,
+    spread: "NodeSpread",
+    folder: Path,
+    key: str,
+    chunk_size: int,
+    interrupted: Callable[[], bool],
+    progress: Callable[[int, int], None],
+) -> "Shard":
+    """Like `label_all`, but other machines make the missing shards, several per piece."""
+    from iowbc.reference.labels.pool import label_all
+    from iowbc.reference.labels.shards import cut, read_shard
+
+    folder.mkdir(parents=True, exist_ok=True)
+    chunks, paths = cut(indices, chunk_size, folder)
+    missing = [number for number, path in enumerate(paths) if read_shard(path, key, chunks[number]) is None]
+    size = max(1, len(missing) // (SHARES * spread.width))
+    shares = [missing[start : start + size] for start in range(0, len(missing), size)]
+    ready = len(indices) - sum(len(chunks[number]) for number in missing)
+    progress(ready, len(indices))
+    calls = [(task, [chunks[number] for number in share], key, chunk_size) for share in shares]
+    for place, shards in spread(label_share, calls, {"robot": task.robot}):
+        for number, content in zip(shares[place], shards, strict=True):
+            paths[number].write_bytes(content)
+            ready += len(chunks[number])
+        progress(ready, len(indices))
+    return label_all(
+        task,
+        indices,
+        folder=folder,
+        key=key,
+        chunk_size=chunk_size,
+        workers=1,
+        interrupted=interrupted,
+        progress=progress,
+    )
+
+
+def label_share(
+    task: "LabelTask", chunks: Sequence[Sequence[int]], key: str, chunk_size: int, *, robot: Path
+) -> list[bytes]:
+    """File contents of the shards of some chunks, made in a separate process, which a solver may crash."""
+    from iowbc.reference.labels.pool import label_all
+
+    with tempfile.TemporaryDirectory(prefix="iowbc-labels-") as folder:
+        label_all(
+            replace(task, robot=robot),
+            [index for chunk in chunks for index in chunk],  # only the last may be short: cut again, they are equal
+            folder=Path(folder),
+            key=key,
+            chunk_size=chunk_size,
+            workers=1,
+            interrupted=lambda: False,
+            progress=lambda done, total: None,
+        )
+        return [path.read_bytes() for path in sorted(Path(folder).glob("*.shard"))]
 
 
 STAGE = Stage(

@@ -7,7 +7,7 @@ import pytest
 import torch
 from gymnasium import spaces
 
-from iowbc.learning.as_numpy import acting_policy, student_policy, teacher_policy
+from iowbc.learning.as_numpy import acting_policy, numpy_policy, student_policy
 from iowbc.learning.networks import StudentNetwork, TeacherNetwork, mirror_as_json
 from iowbc.learning.policy import ActorCritic
 from iowbc.robot.mirror import MirrorMap
@@ -42,7 +42,7 @@ def test_a_teacher_in_numpy_acts_as_its_network(symmetric: bool, activation: str
     network = shaken(TeacherNetwork(4, 3, (32, 16, 8), activation, 2.0, mirrors(symmetric)))
     rows = 3.0 * torch.randn(20, 4)
     with torch.no_grad():
-        np.testing.assert_allclose(teacher_policy(network)(rows.numpy()), network(rows).numpy(), rtol=1e-6, atol=4e-6)
+        np.testing.assert_allclose(numpy_policy(network)(rows.numpy()), network(rows).numpy(), rtol=1e-6, atol=4e-6)
 
 
 @pytest.mark.parametrize("told", [None, TOLD])
@@ -81,7 +81,7 @@ def test_what_is_hidden_from_a_policy_moves_none_of_its_actions_in_numpy(symmetr
 @pytest.mark.parametrize("environments", [1, 3, 8, 20, 33, 96])
 def test_a_row_gets_the_same_bits_whichever_blocks_are_computed_with_it(environments: int) -> None:
     network = shaken(TeacherNetwork(4, 3, (64, 32), "elu", 10.0, mirrors(True)))
-    policy, rows = teacher_policy(network), np.random.default_rng(0).normal(size=(environments, 4)).astype(np.float32)
+    policy, rows = numpy_policy(network), np.random.default_rng(0).normal(size=(environments, 4)).astype(np.float32)
     size = block_size(environments)
     together = in_blocks(policy, size, rows)
     for parts in (1, 2, 3, 7, 200):

@@ -16,7 +16,7 @@ from stage_jobs import Backwards
 from iowbc.errors import Interrupted, WorkerFailed
 from iowbc.reference.labels.pool import CRASHED, _on_death, _Queue, _Worker, label_all
 from iowbc.reference.labels.shards import Shard, read_shard
-from iowbc.stages.label_everywhere import label_everywhere
+from iowbc.stages.rg_dataset import label_everywhere
 
 COUNT, CHUNK = 40, 8
 
