@@ -48,7 +48,7 @@ def robot(
     ] = None,
     log: Annotated[Path | None, typer.Option(help="Log every message to this new file.", metavar="MCAP")] = None,
     waive: Annotated[list[str] | None, typer.Option(help="Ignore a failure of this check (repeatable).")] = None,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Check the robot and send nothing.")] = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Check the robot and send no motor command.")] = False,
     lockstep: InStep = False,
     seconds: Seconds = float("inf"),
 ) -> None:
@@ -134,7 +134,7 @@ def report_checks(console: Console, found: "list[CheckResult]", waived: Collecti
     if failed:
         names, (first, *_) = ", ".join(check.name for check in failed), failed
         other = f", or pass --waive {first.name} if you know why" if first.waivable else ""
-        raise UsageError(f"{names}: failed, nothing was sent; put it right{other}")
+        raise UsageError(f"{names}: failed, no motor command was sent; put it right{other}")
 
 
 def robot_sim(

@@ -203,7 +203,7 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("export")
     folder = exported_folder(parser.parse_args().export)
-    print("| fault | state reached | reason | time to damping | robot |\n|---|---|---|---:|---|")
+    print("| fault | program's state | reason | time until damping is sent | robot |\n|---|---|---|---:|---|")
     for name, fault in FAULTS.items():
         end = play(folder, fault)
         time = "" if np.isnan(end.time) else f"{1e3 * end.time:.0f} ms"

@@ -98,5 +98,5 @@ def test_silence_and_a_robot_with_other_motors_cannot_be_waived(still: Still, mo
     monkeypatch.setattr(still.controller, "contract", still.controller.contract.model_copy(update={"joints": joints}))
     other = checks(still.controller, listened, "free", still.standing, LIMITS)
     for found, name in ((silent, "states"), (other, "model")):
-        with pytest.raises(UsageError, match=rf"^{name}: failed, nothing was sent; put it right$"):
+        with pytest.raises(UsageError, match=rf"^{name}: failed, no motor command was sent; put it right$"):
             report_checks(Console(width=60), found, (name, "battery"))
