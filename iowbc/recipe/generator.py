@@ -240,7 +240,7 @@ class ReferenceGenerator(Section):
     """The reference generator: its dataset and its network."""
 
     method: Literal["static", "ocp"] = "static"
-    """Method of labelling: `ocp` is the optimal control problem, `static` its steady state (15 times faster)."""
+    """Method of labelling: `ocp` is the optimal control problem, `static` its steady state (8 times faster)."""
     height: Literal["pelvis", "com"] = "pelvis"
     """Meaning of the commanded height: the pelvis (0.5 to 0.8 m on the G1), or the centre of mass (paper)."""
     sampling: Sampling = Sampling()
