@@ -33,7 +33,7 @@ LONG_STAGE = 3600.0
 
 
 def gc(
-    unused: Annotated[bool, typer.Option("--unused", help="Remove artifacts that no recipe uses.")] = False,
+    unused: Annotated[bool, typer.Option("--unused", help="Remove artifacts that no recipe ever used.")] = False,
     recipes: Annotated[
         list[str] | None,
         typer.Option("--recipe", help="Remove this recipe's record and the artifacts that only it uses."),

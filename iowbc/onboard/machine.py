@@ -100,6 +100,8 @@ class Machine:
         self._foreign = -np.inf
         """Time of the last command of another program [s]."""
         self._charge: float | None = None
+        self._charged = -np.inf
+        """Time of the newest battery message [s]."""
         self._warned: set[str] = set()
         self._from = self._goal = self._target = np.array(contract.default_position)
 
@@ -108,7 +110,8 @@ class Machine:
         self.events = []
         given = replace(given, wanted=replace(given.wanted, command=self._ranges.clipped(given.wanted.command)))
         self.sensors.take(given.states, given.now)
-        self._charge = self._charge if given.charge is None else given.charge
+        if given.charge is not None:
+            self._charge, self._charged = given.charge, given.now
         self._foreign = given.now if given.others else self._foreign
         wanted = given.wanted.request
         if self.state in MOVING and (reason := self._fault(given)) is not None:
@@ -118,8 +121,10 @@ class Machine:
                 self._enter(wanted, given, "requested")
             else:
                 self.events.append(f"{wanted} refused: {refusal}")
-        if self.state in MOVING:  # low battery or warm motor: warn once after each Stand
+        if self.state in MOVING:  # low or silent battery, or warm motor: warn once after each Stand
             found = self._exhausted(self.limits.battery, self.limits.temperature)
+            if self._charge is not None and (age := given.now - self._charged) > self.limits.battery_age:
+                found["silence"] = f"no battery message for {age:.0f} s, the last said {self._charge:.0f} %"
             self.events += [f"warning: {text}" for name, text in found.items() if name not in self._warned]
             self._warned |= found.keys()
         self._last = given.now

@@ -160,6 +160,18 @@ def test_a_low_battery_is_warned_of_once_and_damps_when_it_is_empty(still: Still
     assert "stand refused: battery at 9 %" in still.machine.events[0]
 
 
+def test_a_battery_whose_messages_stop_is_warned_of_once(still: Still) -> None:
+    still.until(State.RUN)
+    still.turn(charge=50.0)
+    limit = round(still.machine.limits.battery_age / PERIOD)
+    told = []
+    for _ in range(limit + 10):
+        still.turn()
+        told += still.machine.events
+    assert told == ["warning: no battery message for 10 s, the last said 50 %"]
+    assert still.machine.state is State.RUN
+
+
 def test_a_warm_motor_is_warned_of_once_after_each_stand(still: Still) -> None:
     def warm() -> tuple[str, ...]:
         still.turns += 1
