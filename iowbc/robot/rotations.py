@@ -36,6 +36,15 @@ def wrapped(angle: Array) -> Array:
     return np.asarray((angle + np.pi) % (2.0 * np.pi) - np.pi)
 
 
+def turned(vectors: Array, angle: Array) -> Array:
+    """Vectors (n, 2 or 3) turned about the vertical by angles (n,) [rad]."""
+    cosine, sine = np.cos(angle), np.sin(angle)
+    result = vectors.copy()
+    result[:, 0] = cosine * vectors[:, 0] - sine * vectors[:, 1]
+    result[:, 1] = sine * vectors[:, 0] + cosine * vectors[:, 1]
+    return result
+
+
 def normalized(quaternion: Array) -> Array:
     """The quaternion scaled to unit length; shape (..., 4)."""
     return quaternion / np.linalg.norm(quaternion, axis=-1, keepdims=True)

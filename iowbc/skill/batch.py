@@ -12,6 +12,7 @@ from iowbc.control.skill_observation import YAW, joined, of_object, robot_observ
 from iowbc.errors import UsageError, require_known
 from iowbc.recipe.skill.skill import Skill
 from iowbc.recipe.skill.task import TransportTask
+from iowbc.robot.rotations import turned
 from iowbc.rollouts.blocks import block_size
 from iowbc.sim.shapes import measured as shape_of
 from iowbc.skill import observation as seen
@@ -22,7 +23,7 @@ from iowbc.skill.object_motion import NominalCommand, ObjectMotion, open_loop_mo
 from iowbc.skill.path import Paths
 from iowbc.skill.plan import CLOCK, KINDS, PERSON, RULES, EpisodeDraws, Plan
 from iowbc.skill.reward import GameEnding, ending, potential, reward
-from iowbc.skill.situation import GameState, Origin, situation, turned
+from iowbc.skill.situation import GameState, Origin, situation
 from iowbc.task.episodes import Episode
 from iowbc.task.specification import Specification
 from iowbc.task.vector.setup import scene_of

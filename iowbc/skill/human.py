@@ -4,9 +4,9 @@ import numpy as np
 
 from iowbc.arrays import Array, Mask
 from iowbc.recipe.skill.skill import Skill
-from iowbc.robot.rotations import wrapped
+from iowbc.robot.rotations import turned, wrapped
 from iowbc.skill.object_motion import ObjectMotion
-from iowbc.skill.situation import GameState, turned
+from iowbc.skill.situation import GameState
 
 
 class Human:

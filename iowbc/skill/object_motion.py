@@ -9,9 +9,9 @@ from iowbc.control.command import HEIGHT, OFFSET, YAW_RATE
 from iowbc.control.skill_command import SkillCommand
 from iowbc.recipe.skill.skill import PathFollowing, Skill
 from iowbc.recipe.task.commands import Commands
-from iowbc.robot.rotations import wrapped
+from iowbc.robot.rotations import turned, wrapped
 from iowbc.skill.path import Paths
-from iowbc.skill.situation import GameState, turned
+from iowbc.skill.situation import GameState
 
 
 @dataclass(frozen=True)

@@ -5,11 +5,11 @@ from collections.abc import Mapping
 import numpy as np
 
 from iowbc.learning.networks import TeacherNetwork
+from iowbc.robot.rotations import turned
 from iowbc.sim.rendering.renderer import Line
 from iowbc.skill.game import COUNTED, TransportGame
 from iowbc.skill.lower_layer import Student
 from iowbc.skill.plan import Plan
-from iowbc.skill.situation import turned
 from iowbc.skill.trained import mean_actions
 from iowbc.task.specification import Specification
 

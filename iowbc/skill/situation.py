@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from iowbc.arrays import Array, Indices
-from iowbc.robot.rotations import rotate, wrapped
+from iowbc.robot.rotations import rotate, turned, wrapped
 from iowbc.sim.simulation import Simulation
 from iowbc.skill.path import Paths
 from iowbc.task.motion import Motion
@@ -87,12 +87,3 @@ def situation(
         height_error=position[:, 2] - paths.height(path, covered),
         left=paths.length[path] - covered,
     )
-
-
-def turned(vectors: Array, angle: Array) -> Array:
-    """Vectors (n, 2 or 3) turned about the vertical by angles (n,) [rad]."""
-    cosine, sine = np.cos(angle), np.sin(angle)
-    result = vectors.copy()
-    result[:, 0] = cosine * vectors[:, 0] - sine * vectors[:, 1]
-    result[:, 1] = sine * vectors[:, 0] + cosine * vectors[:, 1]
-    return result

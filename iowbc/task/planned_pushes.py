@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from iowbc.arrays import Array, Indices
+from iowbc.robot.rotations import turned
 from iowbc.task.episodes import PlannedPull, PlannedPush
 
 
@@ -50,5 +51,4 @@ class PlannedPulls:
 
 def in_world(forward: Array, left: Array, heading: Array) -> Array:
     """Horizontal vectors of a heading frame as world vectors, (n, 3)."""
-    cosine, sine = np.cos(heading), np.sin(heading)
-    return np.stack([cosine * forward - sine * left, sine * forward + cosine * left, np.zeros(len(heading))], axis=1)
+    return turned(np.stack([forward, left, np.zeros(len(heading))], axis=1), heading)

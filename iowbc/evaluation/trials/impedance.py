@@ -6,6 +6,7 @@ import numpy as np
 
 from iowbc.arrays import Array
 from iowbc.evaluation.trials.trace import Trace
+from iowbc.robot.rotations import turned
 from iowbc.task.episodes import PlannedPull
 
 
@@ -47,8 +48,7 @@ def impedance_metrics(trace: Trace, pull: PlannedPull | None) -> dict[str, float
         period = 1.0 / pull.frequency
         first, last = (round((pull.begin + time) / trace.dt) for time in (period, pull.duration))
         if last - first >= round(period / trace.dt) and len(trace) >= last:
-            yaw, (forward, left) = trace.heading_reference[first], pull.force
-            along = np.array([np.cos(yaw) * forward - np.sin(yaw) * left, np.sin(yaw) * forward + np.cos(yaw) * left])
+            (along,) = turned(np.array([pull.force]), trace.heading_reference[[first]])
             along /= np.linalg.norm(along)
             force, position = trace.external_force[first:last, :2], trace.object_position[first:last, :2]
             value = impedance(force @ along, position @ along, pull.frequency, trace.dt)

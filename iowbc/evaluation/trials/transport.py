@@ -4,6 +4,7 @@ import numpy as np
 
 from iowbc.arrays import Array, Mask
 from iowbc.control.command import YAW_RATE
+from iowbc.robot.rotations import turned
 
 SHORTEST_WAY = 0.1
 """Minimum commanded distance for a transport metric [m]."""
@@ -15,10 +16,8 @@ def commanded_path(given: Array, heading: float, dt: float) -> tuple[Array, floa
     given: commands (T, 11); heading: of the robot at the start [rad].
     """
     yaw = heading + dt * np.cumsum(given[:, YAW_RATE])
-    (forward, left), cosine, sine = given[:, :2].T, np.cos(yaw), np.sin(yaw)
-    speed = np.hypot(forward, left)
-    turned = np.stack([cosine * forward - sine * left, sine * forward + cosine * left], axis=1)
-    directions = np.divide(turned, speed[:, None], out=np.zeros_like(turned), where=speed[:, None] > 0)
+    velocity, speed = turned(given[:, :2], yaw), np.hypot(given[:, 0], given[:, 1])
+    directions = np.divide(velocity, speed[:, None], out=np.zeros_like(velocity), where=speed[:, None] > 0)
     return directions, float(speed.sum() * dt)
 
 
