@@ -47,8 +47,8 @@ HEADROOM = 0.15
 """Space above the highest point, as a fraction of its height."""
 FAILURE_SPACING = 0.035
 """Distance between the survivor marks of two variants, as a fraction of the panel height."""
-COUNT_WIDTH = 0.07
-"""Width of a survivor count, as a fraction of the range of masses."""
+COUNT_WIDTH = 0.021
+"""Width of a character of a survivor count, as a fraction of the range of masses."""
 WHISKERS = {"ecolor": "black", "capsize": 3, "elinewidth": 1.0}
 """Style of intervals on bars."""
 
@@ -243,16 +243,17 @@ def _capacity_bars(axes: Axes, found: Capacities, names: Sequence[str]) -> None:
 
 def _mark_survivors(axes: Axes, rows: pd.DataFrame, place: int, colour: str, width: float) -> None:
     """Mark masses that not all trials survived at the upper edge, one line per variant: survivors, or a cross. Counts
-    that would overlap are left out."""
+    that would overlap are left out. `width`: of a character [kg]."""
     style: dict[str, Any] = {"color": colour, "transform": axes.get_xaxis_transform(), "in_layout": False}
     height, failed = 0.98 - FAILURE_SPACING * place, rows[rows["survived"] == 0]["mass"]
     axes.plot(failed, [height] * len(failed), "x", clip_on=False, **style)
     free = -np.inf
     for row in rows[(rows["survived"] > 0) & (rows["survived"] < rows["trials"])].itertuples():
-        if row.mass >= free:
-            count = f"{row.survived}/{row.trials}"
+        count = f"{row.survived}/{row.trials}"
+        needed = width * len(count)
+        if row.mass >= free and not (abs(failed - row.mass) < 0.6 * needed).any():
             axes.text(float(row.mass), height, count, ha="center", va="center", fontsize=7, **style)
-            free = row.mass + width
+            free = row.mass + needed
 
 
 def _from_zero(axes: Axes) -> None:
