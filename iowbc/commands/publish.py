@@ -28,7 +28,8 @@ def publish(
     ] = None,
     runs: options.RunsFolder = options.RUNS,
 ) -> None:
-    """Copy a recipe's artifacts, and those that it begins from, to `runs/published/`, and verify the copies.
+    """Copy a recipe's artifacts, and those that it begins from, to `runs/published/`, except for the files in
+    `without`, and verify the copies.
 
     Raises `UsageError` if a stage has not run, or if no artifact has a file in `without`. Code changes since an
     artifact was made are reported but accepted.

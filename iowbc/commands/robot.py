@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from iowbc.twin.robot import Twin
 
 LISTENING = 3.0
-"""Time of listening to the bus before the checks [s]; the battery's state arrives once or twice per second."""
+"""Time of listening to the bus before the checks [s]; the battery's state is assumed to arrive once or twice per
+second."""
 POLLING = 5
 """Periods of the bus between two looks for a request of the page."""
 Network = Annotated[str, typer.Option(help="Network interface: lo for this machine, eth0 or another for a robot.")]

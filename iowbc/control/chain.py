@@ -1,8 +1,8 @@
 """Chains of hinges, many rows at once: where each hinge is, from the base outward.
 
 Components come first and rows last, so that NumPy's loops are long. Written here: pinocchio and MuJoCo take one posture
-at a time and are not on the robot's computer, and the same code is traced into the exported graph. The last test in
-`tests/control/test_chain.py` is an example worked out by hand.
+at a time and are not on the robot's computer, and the same code is traced into the exported graph. A test has an
+example worked out by hand, a forearm that hangs from an elbow (`tests/control/test_chain.py`).
 """
 
 from collections.abc import Sequence

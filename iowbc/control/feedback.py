@@ -60,7 +60,8 @@ class FootPlacement(Constants):
     def __call__(
         self, foothold: Array, measured: Measured, command: Array, phase: Array, stepping: Array, period: float
     ) -> Array:
-        """Forward offset of left foot, right foot and both from their stride, (n, 3) [m], a control period [s] later.
+        """Forward offset of left foot, right foot and both from their places in the stride a control period [s] later,
+        (n, 3) [m].
 
         `command` C (n, 11); `phase` (n,) of the gait; `stepping` (n,) one while the clock runs, else zero.
         """

@@ -77,8 +77,11 @@ class ReferenceLayer(Constants):
         return changed
 
     def start(self, command: Array, grasp: Array) -> tuple[Array, Array]:
-        """References at the start of an episode, settled in the commanded posture, standing as the gait prior does:
-        arms (n, arm joints), support (n, support joints). `grasp` (n, 2, 3): of the wrists, heading frame [m]."""
+        """References at the start of an episode, settled in the commanded posture, standing as the gait prior does.
+
+        command (n, 11); grasp (n, 2, 3): base grasp wrist positions, heading frame [m]; arms (n, arm joints),
+        support (n, support joints).
+        """
         arms = self.default_arms + 0.0 * command[:, :1]
         target = self.wrist_target(self.support(arms, command), command, grasp)
         for _ in range(self._start.settling):

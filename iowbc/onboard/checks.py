@@ -44,7 +44,7 @@ class SafetyLimits(Section):
     battery_empty: float = Field(default=10.0, ge=0.0, le=100.0)
     """Least charge of a moving robot [%]; an assumption, since the charge at which it turns off is not public."""
     battery_age: float = Field(default=10.0, gt=0.0)
-    """Age of the newest battery message at which a moving robot warns [s]; the rate of these messages is not public."""
+    """Age of the newest battery message at which a moving robot warns [s]; one or two a second are expected."""
     temperature: float = Field(default=80.0, gt=0.0)
     """Highest motor temperature at the start; above it, a moving robot warns [°C]."""
     temperature_hot: float = Field(default=100.0, gt=0.0)

@@ -175,7 +175,8 @@ class Datagram(Section):
 
 
 class Udp:
-    """JSON datagrams at a local port; see `Datagram`. Of invalid ones only a request to damp counts."""
+    """JSON datagrams at a local port; see `Datagram`. Of datagrams that cannot be parsed only a request to damp counts;
+    those with `seen` alone are no commands."""
 
     def __init__(self, ranges: Ranges, port: int) -> None:
         self.ranges = ranges

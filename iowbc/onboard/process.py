@@ -137,11 +137,11 @@ def drive(
     stopped: Callable[[], bool] = lambda: False,
 ) -> Times:
     """Drives the robot until `stopped` or for some time [s], and damps it at the end, also after an error."""
-    kept = np.full((2, KEPT_TIMES), np.nan, np.float32)  # allocated in advance
     turns = 0
     begin: float | None = None
     leaving: float | None = None
     with Teller(tell) as teller, _damping_after_errors(bus, machine):
+        kept = np.full((2, KEPT_TIMES), np.nan, np.float32)  # allocated in advance
         while True:
             now, states = clock.turn(bus)
             started = time.perf_counter()

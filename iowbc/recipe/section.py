@@ -121,7 +121,10 @@ class Interval(Section):
 
 
 class NamedEntries(Section):
-    """Mapping of names to entries: fields, and custom ones of the type that annotates `__pydantic_extra__`."""
+    """Mapping of names to entries of one type: built-in entries are fields, and a recipe may add custom ones.
+
+    The type of custom entries is the annotation of `__pydantic_extra__`.
+    """
 
     model_config = ConfigDict(extra="allow")
 
@@ -165,7 +168,8 @@ class Encoder(Section):
 def sentences(section: type[BaseModel]) -> dict[str, str]:
     """Attribute docstrings of a section and its bases, by field name.
 
-    Read on demand: pydantic's `use_attribute_docstrings` reads every section's source whenever a command starts.
+    They are read on demand: pydantic's `use_attribute_docstrings` reads every section's source whenever a command
+    starts.
     """
     bases = [base for base in section.__bases__ if issubclass(base, BaseModel) and base is not BaseModel]
     (definition,) = ast.parse(textwrap.dedent(inspect.getsource(section))).body
@@ -187,7 +191,8 @@ class InconsistentValues(ValueError):
 
 
 def deciding(section: Section) -> dict[str, Any]:
-    """Values of a section's key, as JSON data: no COSMETIC fields, LATER fields at their default, or idle entries."""
+    """The values of a section that enter its key, as JSON data. At every depth, COSMETIC fields, LATER fields at their
+    default and idle entries are left out."""
     return _deciding(section, section.model_dump(mode="json"))
 
 

@@ -87,7 +87,8 @@ class HistoryNetwork(Encoder):
 
 
 class Restart(Section):
-    """A warm restart: the standard deviation is raised once and decays again, to learn new conditions."""
+    """A warm restart: the standard deviation is raised once and decays again, so that a policy that hardly explores can
+    learn new conditions."""
 
     after: int = Field(default=0, ge=0, le=10**12)
     """Environment steps before the restart; 0: at the start, for a training that begins from a trained policy

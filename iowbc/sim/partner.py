@@ -59,7 +59,8 @@ class Partner:
         """Partners with a feed of their own: velocity of the handle in the frame of the heading at the start, yaw rate
         of the object, and height of the handle from any origin; from the next reset on, (n,). Not part of snapshots."""
         self.loose = np.zeros(n, np.bool_)
-        """Steered partners without horizontal force: they bear their share and follow, (n,). Not in snapshots."""
+        """Steered partners without horizontal force: they bear their share and follow the handle, (n,). Not
+        in snapshots."""
         self._turning_inertia = np.array([measured(thing).about_axes[2] if thing else 0.0 for thing in things])
         self._yaw_stiffness, self._yaw_damping, self._yaw_lead = np.zeros(n), np.zeros(n), np.zeros(n)
         self._present, self._height = np.zeros(n), np.full(n, np.nan)

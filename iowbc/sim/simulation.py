@@ -134,7 +134,8 @@ class Simulation:
         return gathered
 
     def hold(self, fixed: Mapping[str, Array], which: Indices | slice = EVERY) -> None:
-        """Holds quantities of some environments at values (k,) from the next reset on; NaN draws, others stay."""
+        """Holds quantities of some environments at values (k,) from the next reset on; NaN draws. Other held quantities
+        stay held."""
         unknown = [name for name in fixed if name not in self.drawn]
         if unknown:
             raise KeyError(f"no randomised quantities {unknown}; there are: {', '.join(sorted(self.drawn))}")

@@ -44,6 +44,7 @@ class SimulationState:
         self.base_position = np.zeros((n, 3))
         """Pelvis, (n, 3) [m]."""
         self.base_quaternion = np.tile([1.0, 0.0, 0.0, 0.0], (n, 1))
+        """(n, 4)."""
         self.base_rotation = np.zeros((n, 3, 3))
         """Rotation matrix of the base, (n, 3, 3)."""
         self.base_linear_velocity = np.zeros((n, 3))
@@ -75,7 +76,9 @@ class SimulationState:
         self.foot_force = np.zeros((n, 2, 3))
         """Contact force on each foot, of the ground and of whatever else it touches, (n, 2, 3) [N]."""
         self.foot_contact = np.zeros((n, 2), np.bool_)
+        """(n, 2)."""
         self.has_object = np.zeros(n, np.bool_)
+        """(n,)."""
         self.object_position = np.zeros((n, 3))
         """Object's centre, (n, 3) [m]; zero without an object."""
         self.object_quaternion = np.tile([1.0, 0.0, 0.0, 0.0], (n, 1))

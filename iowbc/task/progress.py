@@ -28,7 +28,7 @@ def follow(
 
 
 class EpisodeOutcome:
-    """Results of the episodes of n environments that end in this step, each (n,)."""
+    """Results of the episodes of n environments, each (n,); valid where an episode ends in this step."""
 
     def __init__(self, memory: EpisodeState, ending: Ending, period: float, blame: float) -> None:
         """`blame`: time for which a disturbance counts as recent [s]."""

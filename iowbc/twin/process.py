@@ -1,4 +1,4 @@
-"""Process of a simulated robot: states and object poses out, commands in, in real time or in lock step with them."""
+"""Process of a simulated robot: states and object poses out, commands in, in real time or in lock step with those."""
 
 import json
 import socket

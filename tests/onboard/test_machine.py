@@ -170,6 +170,16 @@ def test_a_battery_whose_messages_stop_is_warned_of_once(still: Still) -> None:
         told += still.machine.events
     assert told == ["warning: no battery message for 10 s, the last said 50 %"]
     assert still.machine.state is State.RUN
+    still.turn(State.DAMPING)
+    still.turn(State.STAND)
+    assert "warning: no battery message for 10 s, the last said 50 %" in still.machine.events
+
+
+def test_a_battery_that_never_sent_a_message_is_not_missed(still: Still) -> None:
+    still.until(State.RUN)
+    for _ in range(round(still.machine.limits.battery_age / PERIOD) + 10):
+        still.turn()
+        assert still.machine.events == []
 
 
 def test_a_warm_motor_is_warned_of_once_after_each_stand(still: Still) -> None:

@@ -10,6 +10,9 @@ from task_worlds import actions
 
 from iowbc.recipe.task.curriculum import Curriculum
 from iowbc.task.curriculum import AXES, difficulty, initial_levels, next_levels, phase, played_levels
+from iowbc.task.endings import Ending
+from iowbc.task.episode_state import EpisodeState
+from iowbc.task.progress import EpisodeOutcome
 from iowbc.task.vector.vector_env import VectorEnv
 
 Make = Callable[..., VectorEnv]
@@ -32,6 +35,13 @@ WELL: Any = SimpleNamespace(
 def replace(outcome: Any, **changes: Any) -> Any:
     assert changes.keys() <= vars(outcome).keys()
     return SimpleNamespace(**vars(outcome) | changes)
+
+
+def test_the_outcomes_of_these_tests_have_the_fields_of_real_ones() -> None:
+    memory = EpisodeState(1, 14, 15)
+    memory.limit[:] = 1
+    real = EpisodeOutcome(memory, Ending(*np.zeros((5, 1), np.bool_)), 0.02, 1.0)
+    assert vars(WELL).keys() == vars(real).keys()
 
 
 ENDED = replace(WELL, survived=NO, progress_in_time=np.array([0.3]))

@@ -247,13 +247,13 @@ def _mark_survivors(axes: Axes, rows: pd.DataFrame, place: int, colour: str, wid
     style: dict[str, Any] = {"color": colour, "transform": axes.get_xaxis_transform(), "in_layout": False}
     height, failed = 0.98 - FAILURE_SPACING * place, rows[rows["survived"] == 0]["mass"]
     axes.plot(failed, [height] * len(failed), "x", clip_on=False, **style)
-    free = -np.inf
+    free, before = -np.inf, 0.0
     for row in rows[(rows["survived"] > 0) & (rows["survived"] < rows["trials"])].itertuples():
         count = f"{row.survived}/{row.trials}"
         needed = width * len(count)
-        if row.mass >= free and not (abs(failed - row.mass) < 0.6 * needed).any():
+        if row.mass - 0.5 * (needed - before) >= free and not (abs(failed - row.mass) < 0.6 * needed).any():
             axes.text(float(row.mass), height, count, ha="center", va="center", fontsize=7, **style)
-            free = row.mass + needed
+            free, before = row.mass + needed, needed
 
 
 def _from_zero(axes: Axes) -> None:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from io import BytesIO
 from pathlib import Path
 
@@ -77,7 +77,7 @@ Batches = Mapping[str, Sequence[Trial]]
 """Trials of each batch, by name of the batch."""
 
 
-@dataclass
+@dataclass(kw_only=True, eq=False)
 class Protocol:
     """Plays the trials of a recipe's `eval` section; finished batches are cached in `work`.
 
@@ -93,8 +93,8 @@ class Protocol:
     """Receives the trials done, the trials planned so far, and a note."""
     elsewhere: Callable[[Batches], Iterator[tuple[str, bytes]]] | None = None
     """Plays batches on other machines and yields the name and the result of `played` of each."""
-    done: int = 0
-    total: int = 0
+    done: int = field(init=False, default=0)
+    total: int = field(init=False, default=0)
 
     def run(self) -> pd.DataFrame:
         """All trials, one row each: the table of `trials.parquet`. Raises Interrupted when interrupted."""

@@ -38,9 +38,10 @@ class Drake(Section):
 
 
 class Success(Section):
-    """Success criteria of a trial. Survival: neither fall nor drop (`task.termination`). Success: survival and
-    transport of an object that the hands carry or keep; with a partner, also bounded force. An infeasible push instead
-    requires survival, posture, feet that do not slide, and continued pushing. Standing still never succeeds."""
+    """Success criteria of a trial. Survival: neither a fall nor a dropped object, by `task.termination`, for the whole
+    trial. Success: survival and transport of an object that the hands carry or keep; with a partner, also bounded
+    force. An infeasible push instead requires survival, posture, feet that do not slide, and continued pushing. A
+    robot that stands still never succeeds."""
 
     withdrawn_from_key: ClassVar[Mapping[str, Any]] = {"slip_fails": False}
 

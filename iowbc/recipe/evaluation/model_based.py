@@ -41,7 +41,8 @@ class Estimation(Section):
 class ModelBased(Section):
     """A whole-body quadratic program that stands, crouches and leans on both feet; it does not walk.
 
-    Its model is the nominal robot without a load. It observes and acts as the student does.
+    Its model is the nominal robot without a load. It sees the same observation as the student and acts through the same
+    joint controllers.
     """
 
     com: Tracking = Tracking(weight=100.0, stiffness=40.0, damping=10.0)

@@ -106,7 +106,8 @@ BLOCKED = Case(name="blocked crate", scene="push", mass=65.0, fixed={"resistance
 
 
 class Stagnation(Section):
-    """Infeasible pushes (paper IV-D). Success: continued pushing in the commanded posture, without sliding feet."""
+    """Infeasible pushes (paper IV-D). Success: continued pushing in the commanded posture, on feet that do not slide;
+    E_v is expected to be large."""
 
     cases: tuple[Case, ...] = Field(
         default=(BLOCKED.model_copy(update={"fixed": BLOCKED.fixed | {"ground_friction": 0.5}}),), min_length=1
@@ -123,7 +124,8 @@ EIGHT: tuple[Direction, ...] = get_args(Direction)
 
 
 class PushLadder(Section):
-    """Pushes on the base with increasing impulse until the robot falls, in each direction; it must walk afterwards."""
+    """Pushes on the base with increasing impulse until the robot falls. They measure the impulse survived in each
+    direction; the robot must walk afterwards."""
 
     scene: ObjectScene = "lift"
     """Scene of `simulation.scenes`."""
@@ -195,8 +197,10 @@ class PushMap(Section):
 
 
 class Probe(Section):
-    """Linear regression of the object's mass on the policy's observations; alternate trials are its training and test
-    set."""
+    """Linear regression of the object's mass on the policy's observations, in trials with evenly spread masses.
+
+    Trials alternate between training and test set, so that no tested mass was trained on.
+    """
 
     scene: ObjectScene = "lift"
     """Scene of `simulation.scenes`, with an object."""
@@ -224,7 +228,8 @@ class Probe(Section):
 
 
 class Impedance(Section):
-    """Sinusoidal forces on an object that a standing robot holds, to measure its impedance; afterwards it must walk."""
+    """Sinusoidal forces on the centre of mass of a held object; its motion yields the mechanical impedance. The robot
+    stands and holds the object alone; afterwards it must walk."""
 
     scene: ObjectScene = "lift"
     """Scene of `simulation.scenes`."""
@@ -247,7 +252,8 @@ class Impedance(Section):
 
 
 class Compliance(Section):
-    """Partners of different behaviour, a blocked crate, and sinusoidal pulls; without random impulses and pushes."""
+    """Partners of different behaviour, a blocked crate, and sinusoidal pulls; without random impulses and pushes, so
+    that all forces are interaction forces."""
 
     scene: ObjectScene = "lift"
     """Scene of `simulation.scenes`, with an object that is held."""

@@ -39,7 +39,8 @@ def recipe_file(word: str | Path) -> Path:
 
 
 def file_meant_in(folder: Path, word: str) -> Path:
-    """Resolve the name of another recipe in one in `folder`: a file in that folder, else as `recipe_file` does."""
+    """Resolve `extends`, `teacher.start` or one of `variants` in a recipe in `folder`: a file in that folder, with or
+    without extension, else as `recipe_file` does."""
     beside = _spelled(folder, word)
     return next(filter(os.path.isfile, (*beside, recipe_file(word))), beside[0])
 
@@ -50,7 +51,8 @@ def _spelled(folder: Path, word: str | Path) -> list[Path]:
 
 
 def known_files(inside: Path = Path()) -> Iterator[Path]:
-    """Recipes by name (`experts/NAME` in a folder of recipes), in order of precedence."""
+    """Recipes that can be named without their folder, or as `experts/NAME` for those in a folder of recipes, in order
+    of precedence."""
     for folder in FOLDERS:
         for suffix in SUFFIXES:
             yield from sorted((folder / inside).glob(f"*{suffix}"))

@@ -36,7 +36,8 @@ class Curriculum(Section):
 
     Each environment has a level between 0 and 2 on each of four axes: posture, locomotion, load, disturbance. A level
     rises after an episode that survives and succeeds by the axis' own criterion, and falls after an early end that is
-    attributed to the axis. With one level for all axes, robots that could not walk yet received ever heavier loads.
+    attributed to the axis. With a single level for all axes, robots that could not walk yet received heavier loads and
+    stronger pushes before they practised a step.
     """
 
     enabled: bool = True

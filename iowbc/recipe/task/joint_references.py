@@ -28,7 +28,8 @@ class Grasps(NamedEntries):
 
 
 class Loads(NamedEntries):
-    """Loads that the arm references compensate in each scene [kg]; other loads raise or lower the hands."""
+    """Loads that the arm references compensate in each scene [kg]; lighter objects raise the hands, heavier ones lower
+    them."""
 
     __pydantic_extra__: dict[str, Annotated[float, Field(ge=0.0)]] = Field(init=False)
     free: float = Field(default=0.0, ge=0.0)
@@ -83,7 +84,8 @@ class Recovery(Section):
 
 
 class Placement(Section):
-    """Feedback of the estimated forward speed on footholds: a robot that is pushed ahead steps further ahead."""
+    """Feedback of the estimated forward speed on footholds: a robot that is pushed ahead steps further ahead, and one
+    that lags pushes from further behind."""
 
     gain: float = Field(default=0.15, ge=0.0)
     """Forward shift of a foothold per m/s above the commanded speed [s]. The capture point of a 0.7 m pendulum is 0.27
@@ -104,7 +106,8 @@ class Placement(Section):
 
 
 class TorsoFeedback(Section):
-    """Feedback of the torso's pitch on both hips, to relieve the waist's 35 to 50 N·m: a bow with 8 kg needs 54."""
+    """Feedback of the torso's pitch on both hips, which relieve the waist's motors: these give 35 to 50 N·m, and 8 kg
+    in the hands need 54 in a bow of 0.4 rad."""
 
     integral: float = Field(default=0.1, ge=0.0)
     """Hip rotation rate per radian by which the torso leans further than commanded [1/s]. At 0.3, a policy that was not
@@ -116,7 +119,8 @@ class TorsoFeedback(Section):
 
 
 class HeightFeedback(Section):
-    """Feedback of the estimated height on the legs, which load bends: by 2 cm with 4 kg and 4 cm with 8 kg."""
+    """Feedback of the estimated height on the legs, which extend if robot and load bend the knees. Without it, the
+    pelvis of an expert is 2 cm too low with 4 kg, and 4 cm with 8 kg."""
 
     integral: float = Field(default=0.5, ge=0.0)
     """Extension rate of both legs per metre by which the pelvis is too low [1/s]."""

@@ -121,7 +121,8 @@ class Yielding(Section):
     """Compliance to horizontal forces on the hands: of a partner, impulses, or a blocked crate.
 
     By default v_coll is tracked regardless of the force, as in the paper. With a damping b, velocity terms and
-    curriculum track v_coll + F/b; F: horizontal force of the object on the hands beyond what the transport needs.
+    curriculum track v_coll + F/b, where F is the horizontal force of the object on the hands beyond what the transport
+    needs.
     """
 
     held: float | None = Field(default=None, gt=0.0)
