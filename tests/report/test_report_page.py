@@ -334,3 +334,5 @@ def test_trainings_of_the_skill_that_differ_in_their_seed_are_one_variant() -> N
     runs = [Run(f"{seed}", {}, {"seed": 0, "skill": {"learning": {"seed": seed, "games": 8}}}) for seed in (1, 2)]
     (group,) = grouped(runs)
     assert group.seeds == ("1", "2")
+    several = [Run(f"{seed}", {}, {"seed": 0, "skill": {"learning": {"seed": seed, "games": seed}}}) for seed in (1, 2)]
+    assert len(grouped(several)) == 2

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import KW_ONLY, dataclass, field, replace
 from io import BytesIO
 from pathlib import Path
 
@@ -77,7 +77,7 @@ Batches = Mapping[str, Sequence[Trial]]
 """Trials of each batch, by name of the batch."""
 
 
-@dataclass(kw_only=True, eq=False)
+@dataclass(eq=False)
 class Protocol:
     """Plays the trials of a recipe's `eval` section; finished batches are cached in `work`.
 
@@ -86,6 +86,7 @@ class Protocol:
 
     world: Specification
     policy: Policy
+    _: KW_ONLY
     work: Path
     workers: int
     interrupted: Callable[[], bool] = lambda: False
