@@ -95,13 +95,13 @@ def play(
         tell(console, f"skill of {skill.manifest.recipe}: you are its partner")
         first = GameRequest(task, seed, mass=mass, share=partner_share)
         _serve(console, page, GameSession(world, student, robot, first), panel=GamePanel)
+    elif partner is not None:
+        raise UsageError(f"{word}: --partner is the human of a skill's game, and this names no skill")
     elif page is not None:
         from iowbc.live.session import Session
 
         source, actor = _driven(store, console, word, stage, plan)
         _serve(console, page, Session(source, request), evaluated=actor)
-    elif partner is not None:
-        raise UsageError(f"{word}: --partner is the human of a skill's game, and this names no skill")
     else:
         _play_episode(named_source(store, console, word, stage, scene, plan), request, console)
 

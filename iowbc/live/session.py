@@ -42,7 +42,8 @@ class Session(Played):
         self.environment = self.source.environment(requested_episode(self.source.world.recipe, self.request))
         self.environment.batch.guidance.commander.steer(self.wanted)
         self.robot, self.period = self.environment.batch.robot, self.environment.period
-        self._load()
+        if not self.checkpoint:  # `refresh` loads later ones, and its file is removed when the training ends
+            self._load()
         self._recorder = MomentRecorder(self.environment.batch, recorded(self.environment))
         self.reset()
 

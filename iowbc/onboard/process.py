@@ -62,12 +62,19 @@ class LockStep:
     late = 0.0
 
     def __init__(self) -> None:
-        self._now = 0.0
+        self._now = self._begin = 0.0
+        self._tick = 0
 
     def turn(self, bus: "DdsBus") -> tuple[float, tuple[Record, ...]]:
         arrived = bus.wait(messages.LOW_STATE, PATIENCE)
         states = tuple(bus.take(messages.LOW_STATE))
-        self._now = 1e-3 * float(states[-1]["tick"]) if arrived and states else self._now + PATIENCE
+        if arrived and states:
+            last, self._tick = self._tick, int(states[-1]["tick"])
+            if self._tick < last:  # the robot has restarted, and time goes on
+                self._begin = self._now
+            self._now = self._begin + 1e-3 * self._tick
+        else:
+            self._now += PATIENCE
         return self._now, states
 
 

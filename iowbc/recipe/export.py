@@ -50,8 +50,8 @@ class Export(Section):
     target_tolerance: float = Field(default=1e-3, gt=0)
     """Largest difference between the joint targets of controller and simulation for the same action [rad]; rounding
     differs by some 1e-6."""
-    golden_steps: int = Field(default=100, ge=1, le=100_000)
-    """Control steps of the rollout whose inputs and outputs are kept as golden vectors."""
+    golden_steps: int = Field(default=100, ge=2, le=100_000)
+    """Control steps of the rollout whose inputs and outputs are kept as golden vectors; the first is not timed."""
     timing_steps: int = Field(default=500, ge=1, le=1_000_000, json_schema_extra=COSMETIC)
     """Number of inferences timed for the report."""
     acceptance: tuple[Acceptance, ...] = (Acceptance(),)

@@ -39,12 +39,12 @@ def write_page(exported: Path, out: Path, cache: Path, say: Callable[[str], None
     """
     parts = npm_parts(cache, say)
     world = exported_world(exported)
-    out.mkdir(parents=True, exist_ok=True)
-    for name in (exported_folder.SETTLE, exported_folder.STEP, exported_folder.CONTRACT):
-        shutil.copyfile(exported / name, out / name)
     robot = load_robot(world.robot)
     about = {"scenes": web_scenes(world, robot), "first": first_scene(world.recipe), "golden": golden_vectors(exported)}
-    (out / SCENES).write_text(json.dumps(about, separators=(",", ":")), encoding="utf-8")
+    out.mkdir(parents=True, exist_ok=True)
+    (out / SCENES).write_text(json.dumps(about, separators=(",", ":")), encoding="utf-8")  # first: it marks the folder
+    for name in (exported_folder.SETTLE, exported_folder.STEP, exported_folder.CONTRACT):
+        shutil.copyfile(exported / name, out / name)
     bundle(parts, out)
 
 

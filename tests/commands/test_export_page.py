@@ -4,12 +4,18 @@ import json
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
 from iowbc.commands.export import export
 from iowbc.errors import UsageError
+from iowbc.robot.description import robot_folder
+from iowbc.web import page
 from iowbc.web.page import SOURCE, npm_parts, parts_folder
+
+PUBLISHED = Path(__file__).parents[2] / "runs" / "published" / "export"
 
 
 def test_a_page_is_of_an_exported_controller(folder: Path, tmp_path: Path) -> None:
@@ -23,6 +29,20 @@ def test_a_folder_with_other_files_is_left_alone(folder: Path, tmp_path: Path) -
     (tmp_path / "mine" / "thesis.tex").write_text("")
     with pytest.raises(UsageError, match="holds other files"):
         export(str(tmp_path), tmp_path / "mine", folder / "runs")
+
+
+def test_an_interrupted_page_can_be_written_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: Any) -> None:
+        raise KeyboardInterrupt
+
+    world = SimpleNamespace(robot=robot_folder("g1"))
+    for name, stand_in in (("npm_parts", lambda *_: tmp_path), ("exported_world", lambda _: world)):
+        monkeypatch.setattr(page, name, stand_in)
+    monkeypatch.setattr(page, "web_scenes", interrupted)
+    exported = next(PUBLISHED.iterdir())
+    for _ in range(2):
+        with pytest.raises(KeyboardInterrupt):
+            export(str(exported), tmp_path / "page", tmp_path / "runs")
 
 
 def test_without_node_it_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

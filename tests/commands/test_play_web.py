@@ -29,3 +29,10 @@ def test_without_viser_the_command_that_installs_it_is_named(tmp_path: Path, mon
     monkeypatch.setattr(options, "find_spec", lambda name: None if name == "viser" else found(name))
     with pytest.raises(UsageError, match=r"pip install 'iowbc\[web\]'"):
         play("first", web=True, port=8080, runs=tmp_path)
+
+
+def test_a_human_of_a_game_is_refused_for_a_policy(tmp_path: Path) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    with pytest.raises(UsageError, match="--partner is the human of a skill's game"):
+        play("first", web=True, port=port, partner="follower", runs=tmp_path)

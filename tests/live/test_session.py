@@ -138,4 +138,5 @@ def test_a_checkpoint_that_is_written_again_is_taken_while_the_episode_goes_on(
         assert len(session.track.moments) == 5
         checkpoint.unlink()
         session.refresh()
-        assert loaded == [b"1", b"2"]
+        session.begin(PlayRequest(mass=5.0))
+        assert (drawn(session, "object_mass"), loaded) == (5.0, [b"1", b"2"])

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from still import Still
 
+from iowbc.onboard import messages
 from iowbc.onboard.log import LogWriter
 from iowbc.onboard.machine import OperatorRequest, State
 from iowbc.onboard.messages import Record
@@ -66,6 +67,21 @@ def test_a_terminal_that_is_gone_does_not_end_the_loop(still: Still) -> None:
         raise BrokenPipeError
 
     assert (driven(still, 100, tell=gone).commands[99]["motor_cmd"]["kp"][:29] > 0.0).all()
+
+
+def test_in_lock_step_time_goes_on_when_the_robot_restarts() -> None:
+    ticks = iter((1000, None, 0, 2))
+
+    def take(kind: Any) -> list[Record]:
+        state = messages.empty(messages.LOW_STATE)
+        if (tick := next(ticks)) is None:
+            return []
+        state["tick"] = tick
+        return [state]
+
+    bus: Any = SimpleNamespace(wait=lambda kind, seconds: True, take=take)
+    clock = LockStep()
+    assert [clock.turn(bus)[0] for _ in range(4)] == pytest.approx([1.0, 2.0, 2.0, 2.002])
 
 
 def test_a_full_disk_ends_the_log_alone(still: Still, tmp_path: Path) -> None:

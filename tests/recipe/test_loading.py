@@ -76,6 +76,7 @@ def test_what_is_no_file_of_a_recipes_size_is_refused(tmp_path: Path) -> None:
         "rg: {feasible: {heights: 1000000}}",
         "execution: {workers: 1000000}",
         "seed: " + "9" * 5000,
+        "export: {golden_steps: 1}",
         "seed: 0x" + "f" * 5000,
     ],
 )
