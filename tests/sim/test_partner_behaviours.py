@@ -103,6 +103,14 @@ def test_a_lagging_partner_hears_the_command_late_and_hardly_damps(robot):
     assert lagging.move((0.0, 0.0, 0.0), WALK, 1.0)[-1, 0] > 10.0
 
 
+def test_a_partner_whose_delay_is_not_drawn_hears_the_command_after_the_nominal_one(robot):
+    slow = Recipe().delay.model_copy(update={"nominal": 1.0, "enabled": False})
+    recipe = changed(SimulationSettings(), "partner.delay", slow)
+    late = Handle(robot, "path", recipe=recipe, partner_delay=np.nan)
+    assert np.abs(late.move((0.0, 0.0, 0.0), WALK, 0.98)[:, 0]).max() < 1e-9
+    assert late.move((0.0, 0.0, 0.0), WALK, 0.5)[-1, 0] > 10.0
+
+
 def test_an_absent_partner_intends_and_exerts_nothing(robot):
     absent = Handle(robot, "leader", share=0.0)
     assert not absent.move((0.5, 0.0, 0.0), WALK, 1.0).any()

@@ -8,7 +8,7 @@ from iowbc.recipe.section import LATER, Section
 from iowbc.recipe.simulation.randomization import Distribution
 
 LONGEST_DELAY = 10.0
-"""Length of the buffer of past commands [s]."""
+"""Longest delay that a recipe may draw [s]."""
 TRAINED = ("path", "follower", "leader", "stopping")
 """Behaviours that training may draw."""
 BEHAVIOURS = (*TRAINED, "tugging", "lagging")

@@ -51,7 +51,7 @@ class Commands(Section):
     deep_pitch: Range = (-0.5, 1.5)
     """Torso pitch of the deep leans, the paper's whole range [rad]; while standing, clamped by the feasible map."""
     deep_share: float = Field(default=0.1, ge=0.0, le=1.0)
-    """Fraction of the commands with a deep lean; few, since trials stay within `pitch`."""
+    """Fraction of the standing commands with a deep lean; few, since trials stay within `pitch`."""
     pushing: PushingVelocities = PushingVelocities()
     """Velocities in a scene with a crate to push."""
     common_offset: Vector = (0.05, 0.05, 0.08)

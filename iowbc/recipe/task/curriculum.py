@@ -98,8 +98,9 @@ class Curriculum(Section):
     least_walk: float = Field(default=2.0, ge=0.0)
     """Smallest time with a commanded velocity for an episode to affect the level of locomotion [s]."""
     replay: float = Field(default=0.0, ge=0.0, le=1.0, json_schema_extra=LATER)
-    """Probability that an environment repeats its last failed episode with all its random quantities: loads, partner,
-    latencies, commands, disturbances. A success discards the episode. 0: always a new episode."""
+    """Probability that an environment repeats its last failed episode with all its random quantities (loads, partner,
+    latencies, commands, disturbances), scaled by its present levels. A success discards the episode. 0: always a new
+    episode."""
     blame: float = Field(default=1.0, ge=0.0)
     """Time after an impulse or a push within which a fall is attributed to it [s]."""
     limit: float = Field(default=2.0, ge=0.0, le=2.0)

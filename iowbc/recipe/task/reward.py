@@ -86,7 +86,7 @@ class Smoothness(Section):
     base_rates: float = -0.05
     """Weight of the squared roll and pitch rates of the base [rad²/s²]."""
     vertical_velocity: float = -0.5
-    """Weight of the squared vertical velocity of the base [m²/s²]."""
+    """Weight of the squared vertical velocity of the base beyond that of a commanded change of height [m²/s²]."""
     saturation: float = -0.5
     """Weight of the fraction of support joints at their torque limit."""
 
