@@ -279,6 +279,19 @@ def test_captions_say_partner_friction_height_averaging_and_that_it_is_simulatio
     assert "| 0.132 (2.27) |" in markdown(carried), "cooperative lifting, too, has the paper's numbers"
 
 
+def test_captions_name_the_variants_whose_errors_are_measured_otherwise() -> None:
+    own = trials_of("IO-WBC", "pushing", {30.0: 5})
+    other = own.assign(variant="WBC", gait_period=0.65, height="com", rolling_resistance=np.nan)
+    both = pd.concat([own, other])
+    for table in (error_table(aggregate(both), "pushing"), difference_table(both)):
+        assert table is not None
+        assert "one gait period of 0.80 s (IO-WBC), 0.65 s (WBC)." in table.caption
+        assert (
+            "the pelvis above the ground (IO-WBC), the robot's centre of mass above the ground (WBC);" in table.caption
+        )
+        assert "rolling resistance μ 0.06 (IO-WBC), drawn as in training (WBC)." in table.caption
+
+
 def test_transport_and_weight_in_the_hands_stand_in_the_table() -> None:
     text = markdown(error_table(aggregate(trials_of("IO-WBC", "lifting", {4.0: 5})), "lifting"))
     assert "| 5/5 | 5/5 | 0.90 / 0.80 | 100 % |" in text
