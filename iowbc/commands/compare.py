@@ -158,7 +158,7 @@ def _joined(store: Store, found: Sequence[Run]) -> tuple[list[Table], dict[str, 
     with tempfile.TemporaryDirectory() as folder:
         output, tried = Path(folder), _having(found, TRIALS)
         _report_probes(found, output)
-        if len(tried) > 1:
+        if tried:
             report_joint(tried, output)
         film = film_of(store.runs, [run.label for run in found])
         media = [*sorted((output / "figures").glob("*.png")), *([film] if film else [])]
@@ -240,11 +240,13 @@ def _report_probes(found: Sequence[Run], output: Path) -> None:
 
 def report_joint(runs: Sequence[Run], output: Path, missing: Sequence[str] = ()) -> None:
     """Write tables and figures over all trials of the runs under `output`; `missing`: recipes that belong to them and
-    have not run. Raises `UsageError` where the runs count masses differently."""
+    have not run. An evaluation that several runs share counts once. Raises `UsageError` where the runs count masses
+    differently."""
     import pandas as pd
 
     from iowbc.evaluation.report.report import write_report
 
+    runs = [*{run.artifacts["eval"].folder: run for run in reversed(runs)}.values()][::-1]
     trials, labels = _with_unique_labels(runs, TRIALS)
     rates = {run.artifacts["eval"].recipe["eval"]["success"]["capacity_rate"] for run in runs}
     if len(rates) > 1:

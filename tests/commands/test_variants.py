@@ -8,7 +8,7 @@ from typing import Any, cast
 
 from made_up_trials import trials_of
 
-from iowbc.commands.compare import report_joint
+from iowbc.commands.compare import _joined, report_joint
 from iowbc.commands.lookup import film_of, points_of, start_comparison
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
@@ -118,6 +118,21 @@ def test_trainings_that_differ_in_their_seeds_alone_are_one_variant(tmp_path: Pa
         "| longer | IO-WBC | 3 | 8,192 | – |",
         "| never | not evaluated yet | – | – | – |",
     ]
+
+
+def test_an_evaluation_that_two_recipes_share_counts_once(tmp_path: Path) -> None:
+    full = evaluated(tmp_path, "full", "IO-WBC", 0.1, None, 4096)
+    other = evaluated(tmp_path, "other", "WBC", 0.2, None, 8192)
+    report_joint([full, Run("full.yaml", full.artifacts, full.recipe), other], tmp_path)
+    lifting = (tmp_path / "tables" / "lifting.md").read_text()
+    assert ("| 5/5 | 5/5 |" in lifting, "trainings" in lifting) == (True, False)
+
+
+def test_a_report_has_the_tables_of_the_only_run_with_trials_beside_a_probe(tmp_path: Path) -> None:
+    full, probed = (evaluated(tmp_path, name, name, 0.1, None, 4096) for name in ("full", "probed"))
+    (probed.artifacts["eval"].folder / "trials.parquet").unlink()
+    tables, _ = _joined(Store(Runs(tmp_path / "runs")), [full, probed])
+    assert {"lifting", "capacity"} <= {table.name for table in tables}
 
 
 def test_trainings_whose_recipes_different_versions_wrote_down_are_told_by_what_decided_them(tmp_path: Path) -> None:

@@ -1,11 +1,15 @@
 """Sentences of captions: partner, friction, trainings, meaning of the height, averaging of E_v."""
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 import pandas as pd
 
 from iowbc.evaluation.paper import STAGNATING
 from iowbc.results.table import FAILS
 
+DRAWN = "drawn as in training"
 HEIGHTS = {"pelvis": "the pelvis above the ground", "com": "the robot's centre of mass above the ground"}
 
 
@@ -24,11 +28,17 @@ def trainings(rows: pd.DataFrame) -> str:
 
 def measures(rows: pd.DataFrame) -> str:
     """Measurement of the errors."""
-    first = rows.iloc[0]
     return (
-        f"Errors against the command as given; height is that of {HEIGHTS[str(first['height'])]}; "
-        f"E_v with v_sys averaged over one gait period of {float(first['gait_period']):.2f} s."
+        f"Errors against the command as given; height is that of {_by_variant(rows, 'height', HEIGHTS.__getitem__)}; "
+        f"E_v with v_sys averaged over one gait period of {_by_variant(rows, 'gait_period', '{:.2f} s'.format)}."
     )
+
+
+def _by_variant(rows: pd.DataFrame, column: str, text: Callable[[Any], str]) -> str:
+    """The text of a column's value; where variants differ, that of each value with its variants in brackets."""
+    variants = rows.groupby(rows[column].map(text), sort=False)["variant"].unique()
+    several = ", ".join(f"{value} ({', '.join(own)})" for value, own in variants.items())
+    return several if len(variants) > 1 else str(variants.index[0])
 
 
 def in_common(rows: pd.DataFrame) -> str:
@@ -45,14 +55,14 @@ def partner(rows: pd.DataFrame) -> str:
         return "the partner's share by case"
     share = float(shares[0])
     if np.isnan(share):
-        return "the partner's share drawn as in training"
+        return f"the partner's share {DRAWN}"
     return "without a partner (share 0)" if share == 0 else f"with a partner (share {share:g})"
 
 
 def rolling_resistance(rows: pd.DataFrame) -> str:
     """The crate's μ."""
-    value = float(rows["rolling_resistance"].iloc[0])
-    return "rolling resistance drawn as in training" if np.isnan(value) else f"rolling resistance μ {value:g}"
+    found = _by_variant(rows, "rolling_resistance", lambda value: f"μ {value:g}" if value >= 0 else DRAWN)
+    return f"rolling resistance {found}"
 
 
 def regime(summary: pd.DataFrame, row: pd.Series, error: str) -> list[str]:

@@ -94,8 +94,8 @@ def comparison(summary: pd.DataFrame, capacity_rate: float) -> Figure:
         _capacity_bars(panels[-2], capacities, carrying)
         panels[-2].set(title=f"load capacity at {100 * capacity_rate:.0f} % success", ylabel="mass [kg]")
     _success_panel(panels[-1], _heaviest(summary), "success rate")
-    walked = any(stepping_commanded(summary[summary["suite"] == suite]) for suite in sweeps)
-    return finish(figure, panels, _note(walked) if sweeps else "", panels[0])
+    known = any(_with_paper(summary[summary["suite"] == suite]) for suite in sweeps)
+    return finish(figure, panels, _note(known) if sweeps else "", panels[0])
 
 
 def robustness(summary: pd.DataFrame, rate: float) -> Figure:
@@ -172,7 +172,8 @@ def _row(panel: float, widths: Sequence[float], layout: Any) -> tuple[Figure, li
 
 
 def _with_paper(rows: pd.DataFrame) -> bool:
-    return rows["kind"].iloc[0] in NUMBERS and stepping_commanded(rows)
+    known = bool(rows["variant"].isin(VARIANTS).any())
+    return known and rows["kind"].iloc[0] in NUMBERS and stepping_commanded(rows)
 
 
 def _note(with_paper: bool) -> str:
