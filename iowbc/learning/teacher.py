@@ -104,7 +104,7 @@ class TeacherTraining:
                 self.best.offer(found["check/score"], self._scored())
         if why:
             self._restore_learner(self.best.go_back(f"{why} at {self.steps:,} steps"))
-            low, _ = self.settings.learning_rate_range
+            low = 0.0 if self.settings.desired_kl is None else min(self.settings.learning_rate_range)
             self.model.learning_rate = max(low, self.settings.check.caution * self.model.learning_rate)
             self.say(f"{why} at {self.steps:,} steps: goes back to the best policy, with smaller steps")
         return figures | {"rollbacks": float(self.best.rollbacks)}

@@ -78,6 +78,13 @@ def test_a_score_that_falls_by_a_third_brings_the_best_policy_back_with_smaller_
     assert some.best.caution == 0.5
 
 
+def test_a_collapse_halves_a_constant_learning_rate_below_the_range_too() -> None:
+    some, _ = training(Scores(0.6, 0.1), desired_kl=None, learning_rate=1e-5)
+    for _ in range(2):
+        some.update()
+    assert some.model.learning_rate == pytest.approx(0.5e-5)
+
+
 def test_only_low_scores_in_a_row_are_a_collapse_across_an_interruption_too() -> None:
     patient = CHECK.model_copy(update={"patience": 2})
     some, lines = training(Scores(0.6, 0.1, 0.5, 0.1), check=patient)
