@@ -59,8 +59,8 @@ def capacity_table(summary: pd.DataFrame, rate: float) -> Table:
     suites = suites_of(summary, *SWEPT)
     asked = [(summary.loc[summary["suite"] == suite, "commanded_distance"] > 0).any() for suite in suites]
     caption = (
-        f"Load capacity: the largest mass up to which every mass reached {100 * rate:.0f} % success; "
-        "≥ where the heaviest tried did. In simulation."
+        f"Load capacity: the largest mass up to which every mass has at least {100 * rate:.0f} % success; "
+        "≥: so has the heaviest mass played. In simulation."
     )
     still = (STANDS_STILL, *("none" if one else ABSENT for one in asked))
     columns = {suite: suite.capitalize() for suite in suites}
@@ -71,9 +71,9 @@ def push_table(summary: pd.DataFrame, rate: float) -> Table:
     """The largest impulse on the base that each variant survives, by direction."""
     pushes = summary[summary["kind"] == "pushes"]
     caption = (
-        f"Impulse on the base survived with {float(pushes['mass'].iloc[0]):g} kg in the hands, by its direction, while "
-        f"standing or walking: the largest up to which every one tried reached {100 * rate:.0f} % survival and a walk "
-        "after it. In simulation, without a partner."
+        f"Largest impulse on the base, by direction, standing or walking with {float(pushes['mass'].iloc[0]):g} kg in "
+        f"the hands, up to which the robot survives every impulse played, and walks on, in at least {100 * rate:.0f} % "
+        "of the trials. In simulation, without a partner."
     )
     directions = {str(case): str(case) for case in dict.fromkeys(pushes["case"])}
     return _table("pushes", caption, push_capacities(summary, rate), directions, "N·s", [])

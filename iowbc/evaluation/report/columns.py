@@ -12,6 +12,8 @@ from iowbc.results.table import ABSENT, FAILS, Cell, Column, Table, heads, measu
 
 STANDS_STILL = "stands still"
 """Baseline row: scores of a robot that does not move, computed from the script."""
+IDLE = f"{STANDS_STILL}: errors of a robot that does nothing, computed from the script."
+"""Sentence of a caption about such rows."""
 RAW = "E_v_raw"
 """E_v without the mean over a gait period."""
 ERROR_HEADS = {

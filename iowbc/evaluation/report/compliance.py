@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 from iowbc.evaluation.report.aggregate import variants_of
 from iowbc.evaluation.report.captions import partner, trainings
 from iowbc.evaluation.report.columns import (
+    IDLE,
     SUCCESS,
     SURVIVED,
     Entry,
@@ -63,11 +64,11 @@ def compliance_table(summary: pd.DataFrame) -> Table:
     before = ", ".join(f"{variant} {low} to {high} N" for variant, (low, high) in BLOCKED_BEFORE.items())
     caption = (
         "Interaction with partners of different behaviour. Forces are horizontal: mean / 95th percentile / peak over a "
-        "trial, at the partner's handle, and at the hand with more; work: horizontal, done on the partner; means over "
-        "all trials up to their end. E_v against the command, averaged over a gait period and raw; E_v partner: "
-        "velocity of the handle against the one that the partner intends; means over surviving trials. "
-        f"{FAILS}: none survived. stands still: what doing nothing scores, from the script. Peak force of a hand on "
-        f"a blocked crate, of the first published controllers: {before}. In simulation, undisturbed, {partner(chosen)}."
+        "trial, at the partner's handle and at the more loaded hand; work: horizontal, done on the partner; means over "
+        "all trials until their end. E_v: averaged over a gait period, and raw; E_v partner: error of the handle's "
+        "velocity from the one that the partner intends; means over surviving trials. "
+        f"{FAILS}: none survived. {IDLE} Peak force of a hand on a blocked crate, of the first published controllers: "
+        f"{before}. In simulation, undisturbed, {partner(chosen)}."
         f"{trainings(chosen)}"
     )
     rows = variant_rows(INTERACTION, by_case(chosen), still=True)
@@ -97,8 +98,8 @@ def impedance_table(summary: pd.DataFrame) -> Table:
         f"Mechanical impedance of the standing robot with an object of {float(chosen['mass'].iloc[0]):g} kg to small "
         "sinusoidal pulls on the object: force over velocity at the frequency of the pull, by least squares, mean over "
         "surviving trials. Phase: -90° a spring, 0° a damper, 90° a mass; beyond ±90° the robot adds energy. Below "
-        "each direction: the stiffness, damping and mass (with the object's) that fit all frequencies. In simulation, "
-        f"undisturbed, {partner(chosen)}.{trainings(chosen)}"
+        "each direction: stiffness, damping and mass (including the object's), fitted to all frequencies. "
+        f"In simulation, undisturbed, {partner(chosen)}.{trainings(chosen)}"
     )
     keys = ["variant", "pull_direction"]
     fitted = chosen.merge(pd.DataFrame(numbers), how="left", on=keys) if numbers else chosen

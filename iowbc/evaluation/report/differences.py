@@ -5,7 +5,7 @@ import pandas as pd
 
 from iowbc.evaluation.report.aggregate import TRAINING, WORLD, variants_of, with_trainings
 from iowbc.evaluation.report.captions import in_common
-from iowbc.evaluation.report.columns import HEADS, STANDS_STILL
+from iowbc.evaluation.report.columns import HEADS, IDLE, STANDS_STILL
 from iowbc.evaluation.report.statistics import mean_half_width, mean_p, sign_flip_p
 from iowbc.evaluation.trials.errors import ERRORS
 from iowbc.results.table import ABSENT, Column, Table, heads, measured
@@ -94,11 +94,10 @@ def difference_table(trials: pd.DataFrame) -> Table | None:
     )
     caption = (
         f"Differences to {reference} in pairs of trials with the same seed and commands, over all masses of a "
-        f"suite.{worlds} Errors where both survived, with their 95 % interval and Student's p; success with an exact "
-        "p. Both take the worlds as clusters, in each of which all masses and trainings stand or fall together, and "
-        "hold for these trained policies: a further training varies, too. "
-        f"Negative errors are better. No p is corrected for how many there are. {STANDS_STILL}: what doing nothing "
-        f"scores, from the script, against the trials that {reference} survived. {in_common(trials)}"
+        f"suite.{worlds} Errors where both survived, with 95 % interval and Student's p; success with an exact p. Both "
+        "treat worlds as clusters, since the masses and trainings in a world are correlated, and hold for these "
+        "trained policies: further trainings vary, too. Negative errors are better. No p is corrected for multiple "
+        f"comparisons. {IDLE} It is compared with the trials that {reference} survived. {in_common(trials)}"
     )
     columns = heads(
         *("Suite", "Algorithm", "Pairs"),

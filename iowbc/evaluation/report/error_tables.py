@@ -12,9 +12,9 @@ from iowbc.evaluation.report.captions import conditions, in_common, measures, re
 from iowbc.evaluation.report.columns import (
     ERROR_HEADS,
     HEADS,
+    IDLE,
     OUTCOME,
     RAW,
-    STANDS_STILL,
     SURVIVED,
     Entry,
     by_case,
@@ -56,7 +56,7 @@ def moving_table(summary: pd.DataFrame, suite: str) -> Table:
     """Errors over the parts of the trials in which stepping is commanded."""
     chosen = summary[summary["suite"] == suite]
     caption = (
-        f"Command tracking errors in {suite} while steps are asked for: means over surviving trials with their "
+        f"Command tracking errors in {suite} while a velocity is commanded: means over surviving trials with their "
         f"95 % interval. {conditions(chosen)} {measures(chosen)}"
     )
     entries = [error_entry(name, "_moving") for name in ERROR_HEADS]
@@ -99,10 +99,9 @@ def paper_table(summary: pd.DataFrame, labels: Mapping[str, str] = NO_LABELS) ->
         for (suite, variant), own in frame[frame["paper"].notna()].groupby(["suite", "variant"], sort=False)
     ]
     caption = (
-        "Tables II and III cell by cell: ours / the paper's = ratio, means over surviving trials; the paper's are for "
-        f"its own commands. {FAILS}: no trial survived. Cells with a number of the paper's in which ours is at most as "
-        f"large: {', '.join(counted)}. {STANDS_STILL}: what doing nothing scores, from the script. "
-        f"{in_common(summary)}"
+        "Tables II and III cell by cell: our mean over surviving trials / the paper's value for its own commands = "
+        f"ratio. {FAILS}: no trial survived. Cells of the paper in which ours is at most as large: "
+        f"{', '.join(counted)}. {IDLE} {in_common(summary)}"
     )
     return variant_table("paper", caption, "Table", entries, rows, frame)
 
@@ -171,12 +170,12 @@ def _caption(chosen: pd.DataFrame, kind: str, with_paper: bool) -> str:
     like = f" (paper's Table {NUMBERS[kind]})" if kind in NUMBERS and stepping_commanded(chosen) else ""
     title = f"{whom}{like}" if kind in SWEPT else f"the suite {kind}"
     failed = f" {FAILS}: no trial survived." if (chosen["survived"] == 0).any() else ""
-    aim = " Success here is survival in posture on feet that stay, with a push that goes on: the crate cannot move."
-    beside = " Right, what the paper reports for its own commands, in brackets ours divided by it."
+    aim = " The crate cannot move; success: survived in the commanded posture, with feet in place and a sustained push."
+    beside = " Right: the paper's values, for its own commands, and in brackets ours divided by them."
     return (
         f"Command tracking errors under {title}: means over surviving trials with their 95 % interval. "
-        f"{conditions(chosen)} {measures(chosen)} Transport: parts of the commanded way that robot / object covered; "
-        f"kept: part of the weight that the robot carries which rests in its hands, or how often what is pushed is not "
-        f"lost at its side; success: survived, with enough of both; {STANDS_STILL}: what doing nothing scores, from "
-        f"the script.{failed}{aim if kind == 'stagnation' else ''}{beside if with_paper else ''}"
+        f"{conditions(chosen)} {measures(chosen)} Transport: fractions of the commanded distance that robot / object "
+        "cover; kept: fraction of the robot's part of the weight that its hands bear, or trials whose crate is not "
+        f"lost to a side; success: survived, with enough of both. {IDLE}"
+        f"{failed}{aim if kind == 'stagnation' else ''}{beside if with_paper else ''}"
     )

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from iowbc.evaluation.report.aggregate import TRAINING, variants_of, with_trainings
 from iowbc.evaluation.report.captions import in_common
-from iowbc.evaluation.report.columns import HEADS, STANDS_STILL, transport_commanded
+from iowbc.evaluation.report.columns import HEADS, IDLE, STANDS_STILL, transport_commanded
 from iowbc.evaluation.report.error_tables import SWEPT
 from iowbc.evaluation.report.statistics import RESAMPLES, Bootstrapped, bootstrapped, interquartile_mean
 from iowbc.evaluation.trials.errors import ERRORS, error_norm
@@ -58,13 +58,13 @@ def interquartile_table(trials: pd.DataFrame) -> Table | None:
     if not rows:
         return None
     caption = (
-        "All masses or cases of a suite together that every variant played, in as many first worlds: success, and "
-        "interquartile means of the errors (of the middle half of all trials), with 95 % intervals by bootstrap over "
-        "trainings and worlds. A trial that was not survived counts as worse than any other; "
-        f"{FAILS}: such trials reach into the middle half. "
+        "Success, and interquartile means of the errors (means of the middle half of all trials), over all masses or "
+        "cases of a suite that every variant played, in the same number of worlds; 95 % bootstrap intervals over "
+        "trainings and worlds. A trial that was not survived ranks below all others; "
+        f"{FAILS}: such trials are in the middle half. "
         "P: probability that a trial has a smaller norm of the four errors than one of the first algorithm at the same "
-        "mass. Few trainings say little of how much another one would differ: their own rows stand below. "
-        f"{STANDS_STILL}: what doing nothing scores, from the script. {in_common(played)}"
+        "mass. Few trainings show little of the spread between trainings; each has a row of its own. "
+        f"{IDLE} {in_common(played)}"
     )
     columns = heads("Suite", "Algorithm", "Seeds", "Trials", "Success", *HEADS.values(), "P")
     return Table("interquartile", caption, columns, rows, pd.DataFrame(numbers))

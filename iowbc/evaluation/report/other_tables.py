@@ -54,7 +54,7 @@ def joint_table(summary: pd.DataFrame) -> Table:
     columns = heads("Load", "Algorithm", "Joint", "Peak torque [N·m]", "At its limit")
     caption = (
         "The joints most often at their torque limit at the heaviest load survived: mean over surviving trials of the "
-        "peak torque, and the share of the time at the limit. In simulation."
+        "peak torque, and the fraction of the time at the limit. In simulation."
     )
     return Table("joints", caption, columns, rows, pd.DataFrame(numbers))
 
@@ -81,9 +81,9 @@ def contact_table(summary: pd.DataFrame) -> Table:
         "Contact with the ground and effort at the heaviest load survived: means over surviving trials. Touchdown: "
         "speed of the lowest corner of a sole before it touches. Peak force: of the ground on a foot, in any physics "
         "step. Pressure margin: distance of a loaded foot's centre of pressure from the edge of its sole, mean by its "
-        "load. Friction: horizontal force as a part of what friction allows, 95th percentile. Action: root mean "
-        "square of its second difference over a control period. Torque: root mean square as a part of the limit, of "
-        "the joint with the most. In simulation."
+        "load. Friction: horizontal force as a fraction of the largest that friction allows, 95th percentile. "
+        "Action: root mean square of its second difference over a control period. Torque: root mean square as a "
+        "fraction of the limit, of the joint with the largest. In simulation."
     )
     return variant_table("contact", caption, "Load", CONTACT, rows, chosen)
 

@@ -61,9 +61,9 @@ def probe_table(inferred: pd.DataFrame) -> Table:
     columns = [Column(name, latex=name.replace("R²", "$R^2$")) for name in head]
     caption = (
         "Linear probe: a ridge regression of the object's mass, fitted to half of the trials and tested on the others. "
-        f"{_circumstances(inferred)} In brackets, how many numbers it is read from. A reading is made as soon as the "
-        "history is full; R² of 1 s, and of a trial: of the means of its readings; the interval is over trials. "
-        "s_priv holds the mass itself, among all else that was drawn: it checks the probe."
+        f"{_circumstances(inferred)} In brackets: number of inputs. Readings begin when the history is full; R² of 1 s "
+        "and of a trial: of the means of their readings; the interval is over trials. s_priv contains the mass itself "
+        "among all quantities drawn, and thus tests the probe."
     )
     return Table("probe", caption, heads(*columns), rows, pd.DataFrame(numbers))
 

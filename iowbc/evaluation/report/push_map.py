@@ -32,8 +32,8 @@ def map_table(summary: pd.DataFrame) -> Table:
     columns = heads("Rolling resistance", "Algorithm", *(f"{mass:g} kg" for mass in masses))
     caption = (
         "Pushes by rolling resistance and mass: trials that succeeded, E_v / E_v raw [m/s], mean horizontal force of "
-        "the hands along the command [N]; means over surviving trials. A crate resists with μ m g, and in the paper's "
-        f"tests μ is unknown. {FAILS}: no trial survived. In simulation, {partner(chosen)}. {measures(chosen)}"
+        "the hands along the command [N]; means over surviving trials. A crate resists with μ m g; the paper's "
+        f"μ is unknown. {FAILS}: no trial survived. In simulation, {partner(chosen)}. {measures(chosen)}"
         f"{trainings(chosen)}"
     )
     return Table("push_map", caption, columns, rows, chosen)
