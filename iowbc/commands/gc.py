@@ -4,6 +4,7 @@ import shutil
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from secrets import token_hex
 from typing import Annotated, Any
 
 import typer
@@ -65,7 +66,7 @@ def gc(
         total += count
         verb = "would remove" if dry_run else "removed"
         if path.is_dir() and not dry_run:
-            doomed = path.with_name(REMOVING + path.name.removeprefix(REMOVING))
+            doomed = path.with_name(REMOVING + token_hex(8))
             path.rename(doomed)  # it disappears from its place at once, then its files
             shutil.rmtree(doomed)
         elif not dry_run:

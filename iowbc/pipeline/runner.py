@@ -115,6 +115,7 @@ class Runner:
         for read in self.planner.stages:
             if read.name in stage.reads(self.loaded.recipe) and not self.artifacts[read.name].whole:
                 self.artifacts[read.name] = self._artifact(read, whole=True)
+                remember(self.store.runs, self.loaded, self.artifacts[read.name])
                 step = self._decide(stage, whole)
 
         def waits(holder: object) -> None:

@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, JsonValue, ValidationError
 
@@ -80,7 +80,7 @@ class SweepFile(Section):
     """Name of the sweep; empty: the file's name."""
     description: str = ""
     """Purpose of the sweep, in a sentence."""
-    grid: Mapping[str, list[JsonValue]] = {}
+    grid: Mapping[str, Annotated[list[JsonValue], Field(min_length=1)]] = {}
     """Values by dotted path of the recipe; `0..4` stands for the integers 0 to 4."""
     draws: RandomDraws | None = None
     """Random draws."""

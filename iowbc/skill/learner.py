@@ -7,7 +7,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from iowbc.arrays import Array, Indices
+from iowbc.arrays import Array, Indices, Keys
 from iowbc.learning.checkpoint import Arrays, prefixed, under
 from iowbc.learning.gaussian import divergence, entropy, log_density
 from iowbc.learning.policy import VALUE_GAIN
@@ -61,6 +61,10 @@ class SkillTraining:
         self.steps += self.game.n * self.settings.rollout
         return figures | self._learn(samples)
 
+    def _seeds(self, steps: int) -> Keys:
+        """Seeds of the rollout that begins after some steps."""
+        return np.random.default_rng([self.seed, steps]).integers(2**63, size=self.game.n, dtype=np.uint64)
+
     def _judged(self, observed: Observed) -> Array:
         """Input of the value network."""
         return observed.observations[ROBOT] if self.settings.algorithm == "ppo" else observed.state
@@ -71,8 +75,7 @@ class SkillTraining:
         if self.steps:
             self._move()
         self.critic.normalization.discounted[:] = 0.0
-        seeds = np.random.default_rng([self.seed, self.steps]).integers(2**63, size=game.n, dtype=np.uint64)
-        observed = game.reset(seeds, self.agent_share)
+        observed = game.reset(self._seeds(self.steps), self.agent_share)
         kept: dict[str, list[Array]] = defaultdict(list)
         cut: list[tuple[int, Indices, Array]] = []
         episodes: list[dict[str, Array]] = []
@@ -224,8 +227,10 @@ class SkillTraining:
         return error
 
     def golden_observations(self, decisions: int) -> Array:
-        """Observations of the robots over the first decisions of all games, with mean actions, (decisions x n, k)."""
-        observed, found = self.game.reset(), []
+        """Observations of the robots over the first decisions of the last rollout's games, with mean actions,
+        (decisions x n, k)."""
+        seeds, found = self._seeds(self.steps - self.game.n * self.settings.rollout), list[Array]()
+        observed = self.game.reset(seeds)
         for _ in range(decisions):
             found.append(observed.observations[ROBOT])
             networks = {name: agent.network for name, agent in self.agents.items()}

@@ -166,7 +166,9 @@ def test_gc_removes_what_it_is_told_to_and_nothing_else(folder: Path, command: C
     assert command("gc", "--recipe", "second", "--older-than", "1").stdout == "0 bytes in all\n"
     (folder / "runs" / "tracking").mkdir(exist_ok=True)
     (folder / "runs" / "tracking" / "20260101-empty-1.jsonl").touch()  # its disk was full at once
+    (teachers / f".removing-{key('second', 'teacher')}" / "figures").mkdir(parents=True)  # its removal was killed
     assert command("gc", "--recipe", "second", "--work").returncode == 0
+    assert command("gc", "--unused").returncode == 0
     assert not [*(folder / "runs" / "tracking").glob("*-empty-*")]
     assert [path.name for path in teachers.iterdir()] == [key("first", "teacher")]
     assert "all stages are cached" in command("plan", "first.yaml").stdout

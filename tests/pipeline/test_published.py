@@ -64,7 +64,8 @@ def test_what_leaves_out_its_large_files_stands_for_its_digest_alone(
     monkeypatch.undo()
     for name in ("rg-dataset", "teacher", "distill", "eval", "export"):
         publishing.publish(workplace.store.runs, made[name])
-    shutil.rmtree(workplace.store.runs.store)
+    for made_here in ("store", "recipes", "small"):
+        shutil.rmtree(workplace.store.runs.root / made_here)
     workplace.ran()
     assert all(step.cached for step in workplace.plan().values())
     workplace.run("eval.trials=9")
@@ -74,6 +75,8 @@ def test_what_leaves_out_its_large_files_stands_for_its_digest_alone(
     assert steps["rg-dataset"].cached
     workplace.run("teacher.gamma=0.9")
     assert workplace.ran() == ["rg-fit", "teacher"]
+    (link,) = (workplace.store.runs.root / "small").glob("rg-fit*")
+    assert (link / "result.json").is_file()
 
 
 def test_a_missing_record_makes_nothing_anew(workplace: Workplace, monkeypatch: pytest.MonkeyPatch) -> None:

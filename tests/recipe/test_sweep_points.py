@@ -143,6 +143,7 @@ def test_points_are_counted_before_any_is_read_and_more_are_allowed_by_an_option
     [
         ("grids: {seed: [0, 1]}", "wide.yaml:1:1: key 'grids'"),
         ("grid: {seed: 3}", "key 'grid.seed' = 3: should be a valid list"),
+        ("grid: {seed: []}", "key 'grid.seed' = []: List should have at least 1 item"),
         ("draws: {values: {seed: {low: 0, high: 5}}}", "lacks 'count'"),
         ("draws: {count: 2, values: {seed: {low: 0, high: 5, scale: log}}}", "a logarithmic scale begins above 0"),
         ("grid: {seed: !!python/object:os.system x}", "is not allowed"),

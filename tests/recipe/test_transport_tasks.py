@@ -33,3 +33,8 @@ def test_a_wrong_task_is_refused_and_told_why(change: dict[str, object], told: s
 def test_a_human_is_either_trained_with_or_held_out() -> None:
     with pytest.raises(ValidationError, match="leader: both in training and held out"):
         Recipe.model_validate({"name": "test", "skill": {"partners": {"held_out": ["leader"]}}})
+
+
+def test_an_unknown_human_of_the_evaluation_is_refused_before_the_skill_is_trained() -> None:
+    with pytest.raises(ValidationError, match="'lagging' or 'agent'"):
+        Recipe.model_validate({"name": "test", "skill": {"eval": {"partners": ["legging"]}}})

@@ -125,5 +125,9 @@ def test_all_competitors_play_the_same_episodes_and_finished_batches_are_kept(
     with pytest.raises(Interrupted):
         played_by(Competitor("other", "", "lead", None))
     stop = False
+    damaged = next(tmp_path.glob("MAPPO*.batch"))
+    damaged.write_bytes(damaged.read_bytes()[:-1])
+    pd.testing.assert_frame_equal(played_by(own), played["MAPPO"])
+    assert damaged.with_name(f"{damaged.name}.damaged").is_file()
     with pytest.raises(StageFailed, match=f"observes 3 numbers, this game shows {size}"):
         played_by(Competitor("x", "", None, TeacherNetwork(3, 11, [8], "elu", 5.0)))

@@ -93,6 +93,9 @@ def test_a_resumed_training_ends_bit_for_bit_where_an_unbroken_one_does(algorith
     assert expected.keys() == found.keys()
     for name, value in expected.items():
         np.testing.assert_array_equal(found[name], value, err_msg=name)
+    ended = training(**changes)  # killed after its last checkpoint
+    ended.restore(found)
+    np.testing.assert_array_equal(ended.golden_observations(2), unbroken.golden_observations(2))
 
 
 def test_what_the_human_does_in_scripted_games_teaches_it_nothing() -> None:

@@ -86,6 +86,10 @@ Rival = Literal["nominal", "follow", "lead", "clock", "stand"]
 """Rules of `iowbc.skill.plan.Plan` that act without a skill."""
 
 
+PartnerKind = Literal["path", "follower", "leader", "stopping", "tugging", "lagging", "agent"]
+"""Behaviours of scripted humans, and `agent` for the human driven by actions."""
+
+
 class SkillEvaluation(Section):
     """Comparison of trained skills and baselines, over all combinations of the listed values."""
 
@@ -105,7 +109,7 @@ class SkillEvaluation(Section):
     """Tasks of `skill.tasks`; empty: all."""
     known: tuple[bool, ...] = (True, False)
     """Knowledge of the path: `true` if the robot has it, `false` if only the human does."""
-    partners: tuple[str, ...] = ()
+    partners: tuple[PartnerKind, ...] = ()
     """Humans: scripted behaviours, and `agent` for the learnt one. Empty: those of training, those held out, and the
     learnt one."""
     loads: tuple[float, ...] = Field(default=(0.5,), min_length=1)
@@ -118,10 +122,6 @@ class SkillEvaluation(Section):
     """Seed of the first episode; all skills and baselines have the same episodes."""
     games: int = Field(default=48, ge=1, le=10_000, json_schema_extra=COSMETIC)
     """Games that are played at the same time."""
-
-
-PartnerKind = Literal["path", "follower", "leader", "stopping", "tugging", "lagging", "agent"]
-"""Behaviours of scripted humans, and `agent` for the human driven by actions."""
 
 
 class GameReward(Section):

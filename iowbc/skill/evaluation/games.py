@@ -4,6 +4,7 @@ import itertools
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
+from io import BytesIO
 from pathlib import Path
 from urllib.parse import quote
 
@@ -13,6 +14,7 @@ from pydantic import ValidationError
 
 from iowbc.control.observation import observation_layout
 from iowbc.errors import StageFailed
+from iowbc.files import newest_checked, write_checked
 from iowbc.learning.networks import TeacherNetwork
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.skill.skill import Skill, SkillEvaluation
@@ -44,7 +46,7 @@ class Competitor:
 def planned_games(skill: Skill, learnt_human: bool) -> list[Plan]:
     """All episodes of an evaluation. `learnt_human`: true if there is a trained human."""
     asked, kinds = skill.eval, skill.partners
-    partners = asked.partners or (*kinds.training, *kinds.held_out, *([AGENT] if learnt_human else []))
+    partners: Sequence[str] = asked.partners or (*kinds.training, *kinds.held_out, *([AGENT] if learnt_human else []))
     tasks = {name: getattr(skill.tasks, name) for name in asked.tasks or skill.tasks.names}
     found = []
     for (name, task), known, partner in itertools.product(tasks.items(), asked.known, partners):
@@ -75,8 +77,9 @@ def play_batches(
     for begin in range(0, len(planned), settings.games):
         batch = planned[begin : begin + settings.games]
         place = f"{competitor.label} {competitor.training} {begin} {len(batch)}"
-        path = work / f"{quote(place, safe=' ')}.parquet"
-        if not path.is_file():
+        path = work / f"{quote(place, safe=' ')}.batch"
+        content, _ = newest_checked(path, place)
+        if content is None:
             plans = [replace(plan, rule=competitor.rule) for plan in batch]
             with closing(TransportGame(*controller, n=len(plans), workers=workers, plans=plans)) as game:
                 size = game.observation_sizes[ROBOT]
@@ -93,10 +96,9 @@ def play_batches(
                 partner=[plan.partner for plan in batch],
                 known=[plan.known for plan in batch],
             )
-            partial = path.with_suffix(".part")
-            rows.to_parquet(partial, index=False)
-            partial.rename(path)
-        yield pd.read_parquet(path)
+            content = rows.to_parquet(index=False)
+            write_checked(path, place, content)
+        yield pd.read_parquet(BytesIO(content))
 
 
 def on_controller(world: Specification, label: str, own: Task, student: Student, rg: Path | None) -> Specification:
