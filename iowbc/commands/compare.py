@@ -246,7 +246,10 @@ def report_joint(runs: Sequence[Run], output: Path, missing: Sequence[str] = ())
 
     from iowbc.evaluation.report.report import write_report
 
-    runs = [*{run.artifacts["eval"].folder: run for run in reversed(runs)}.values()][::-1]
+    first = dict[Path, Run]()
+    for run in runs:
+        first.setdefault(run.artifacts["eval"].folder, run)
+    runs = [*first.values()]
     trials, labels = _with_unique_labels(runs, TRIALS)
     rates = {run.artifacts["eval"].recipe["eval"]["success"]["capacity_rate"] for run in runs}
     if len(rates) > 1:

@@ -101,8 +101,7 @@ def _to_remove(
             if not restorable and not holder(runs, key) and not holder(runs, PUBLISHING):
                 yield path
     others = {key for name in known if name not in recipes for key in ever_used(runs, name)}
-    inputs = [one.ingredients.get("inputs", {}) for one in own if one.manifest.key in others]
-    borrowed = {digest for each in inputs for name, digest in each.items() if name not in STAGES}
+    borrowed = {digest for one in own if one.manifest.key in others for digest in _borrowed(one.ingredients)}
     others |= {one.manifest.key for one in own if one.manifest.digest in borrowed}
     for recipe in recipes:
         keys = ever_used(runs, recipe).keys() - others
@@ -110,6 +109,7 @@ def _to_remove(
         yield record_path(runs, recipe)
     if work:
         yield from (folder for folder, _ in unfinished(runs) if not holder(runs, folder.name))
+        yield from runs.work.glob(f"{REMOVING}*")
         for path in runs.tracking.glob("*.jsonl"):
             with Journal(path) as journal:
                 if journal.acquire() and not unsent(path):
@@ -121,5 +121,9 @@ def _to_remove(
 def _reads(attempt: Mapping[str, Any], artifact: Artifact) -> bool:
     """True if an attempt with these ingredients reads an artifact, from its own recipe or from that of another one."""
     stage, digest = artifact.manifest.stage, artifact.manifest.digest
-    inputs = attempt.get("inputs", {})
-    return inputs.get(stage) == digest or digest in [inputs[name] for name in inputs if name not in STAGES]
+    return attempt.get("inputs", {}).get(stage) == digest or digest in _borrowed(attempt)
+
+
+def _borrowed(ingredients: Mapping[str, Any]) -> set[str]:
+    """Digests of the inputs that other recipes made."""
+    return {digest for name, digest in ingredients.get("inputs", {}).items() if name not in STAGES}

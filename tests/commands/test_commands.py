@@ -167,9 +167,11 @@ def test_gc_removes_what_it_is_told_to_and_nothing_else(folder: Path, command: C
     (folder / "runs" / "tracking").mkdir(exist_ok=True)
     (folder / "runs" / "tracking" / "20260101-empty-1.jsonl").touch()  # its disk was full at once
     (teachers / f".removing-{key('second', 'teacher')}" / "figures").mkdir(parents=True)  # its removal was killed
+    (folder / "runs" / "work" / ".removing-1" / "out").mkdir(parents=True)
+    assert "?" not in command("status").stdout
     assert command("gc", "--recipe", "second", "--work").returncode == 0
     assert command("gc", "--unused").returncode == 0
-    assert not [*(folder / "runs" / "tracking").glob("*-empty-*")]
+    assert not [*(folder / "runs" / "tracking").glob("*-empty-*"), *(folder / "runs" / "work").iterdir()]
     assert [path.name for path in teachers.iterdir()] == [key("first", "teacher")]
     assert "all stages are cached" in command("plan", "first.yaml").stdout
 

@@ -73,7 +73,10 @@ def test_the_papers_pushes_never_stand_beside_ours_without_their_unknown_frictio
         for friction, count, error in ((0.06, 5, 0.05), (0.1, 5, 0.2), (0.15, 0, 0.3))
     ]
     pushes = trials_of("IO-WBC", "pushing", {0.0: 5, 60.0: 5})
-    summary = aggregate(pd.concat([pushes, trials_of("IO-WBC", "lifting", {4.0: 5}), *grid]))
+    lifts = trials_of("IO-WBC", "lifting", {4.0: 5})
+    helped = aggregate(pd.concat([pushes.assign(partner_share=0.5), *grid]))
+    assert "in its regime" not in markdown(error_table(helped, "pushing")), "the map has no partner"
+    summary = aggregate(pd.concat([pushes, lifts, *grid]))
     said = "the paper's μ is unknown; ours in its regime 0.400 at μ 0.1, Fails at μ 0.15"
     beside = paper_table(summary)
     assert beside is not None

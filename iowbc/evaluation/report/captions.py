@@ -67,7 +67,7 @@ def rolling_resistance(rows: pd.DataFrame) -> str:
 
 def regime(summary: pd.DataFrame, row: pd.Series, error: str) -> list[str]:
     """Notes beside the paper's E_v at the mass of a row of a summary: that its μ is unknown, and our E_v at the same
-    mass and at μ from `STAGNATING`, where our crates stagnate like the paper's. Empty for other errors or without load.
+    mass and share of the partner and at μ from `STAGNATING`, where our crates stagnate like the paper's. Empty for other errors or without load.
     """
     if error != "E_v" or row["kind"] != "pushing" or not row["mass"] > 0:
         return []
@@ -75,6 +75,7 @@ def regime(summary: pd.DataFrame, row: pd.Series, error: str) -> list[str]:
         (summary["kind"] == "map")
         & (summary["variant"] == row["variant"])
         & (summary["mass"] == row["mass"])
+        & summary["partner_share"].isin([row["partner_share"]])
         & (summary["rolling_resistance"] >= STAGNATING)
     ]
     pairs = zip(alike["E_v"], alike["rolling_resistance"], strict=True)

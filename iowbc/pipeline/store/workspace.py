@@ -136,7 +136,7 @@ def unfinished(runs: Runs) -> list[tuple[Path, Progress]]:
     """Work folders whose output is not in the store yet, and their records, newest first."""
     found = [
         (path, read_progress(path) or Progress())
-        for path in runs.work.glob("*")
+        for path in runs.work.glob("[!.]*")
         if path.is_dir() and ((path / "out").is_dir() or not any(runs.store.glob(f"*/{path.name}")))
     ]
     return sorted(found, key=lambda item: -item[1].updated)
