@@ -67,8 +67,8 @@ def rolling_resistance(rows: pd.DataFrame) -> str:
 
 def regime(summary: pd.DataFrame, row: pd.Series, error: str) -> list[str]:
     """Notes beside the paper's E_v at the mass of a row of a summary: that its μ is unknown, and our E_v at the same
-    mass and share of the partner and at μ from `STAGNATING`, where our crates stagnate like the paper's. Empty for other errors or without load.
-    """
+    mass and partner's share and at μ from `STAGNATING`, where our crates stagnate like the paper's. Empty for other
+    errors or without load."""
     if error != "E_v" or row["kind"] != "pushing" or not row["mass"] > 0:
         return []
     alike = summary[
