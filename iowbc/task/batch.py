@@ -124,7 +124,6 @@ class Batch:
             resistance=simulation.drawn["rolling_resistance"],
         )
         self.record(judgement, action)
-        memory.earlier_action[:], memory.action[:] = memory.action, action
         self.guidance.advance(memory, self._schedule.episode_key, self.simulation.measured)
         self.finish(judgement)
 
