@@ -7,9 +7,10 @@ import numpy as np
 import pandas as pd
 
 from iowbc.evaluation.report.aggregate import ALL_ERRORS, OVER_ALL_TRIALS, STILL
-from iowbc.evaluation.trials.trace import Outcome, Trace
+from iowbc.evaluation.trials.outcome import Outcome
 from iowbc.recipe.recipe import Recipe
 from iowbc.task.commands.script import CommandScript, CommandSegment
+from iowbc.task.record.signals import Trace
 
 DT = 0.02
 JOINTS = {"hip": 80.0, "knee": 100.0}

@@ -14,13 +14,14 @@ from iowbc.arrays import Array
 from iowbc.evaluation.side_by_side import Actor
 from iowbc.evaluation.trials.errors import ERRORS, deviations_from_clamped
 from iowbc.evaluation.trials.interaction import load_metrics
-from iowbc.evaluation.trials.rollout import RECORDED, in_batch, play_in, trace_of
+from iowbc.evaluation.trials.rollout import in_batch, play_in, trace_of
 from iowbc.evaluation.trials.table import replayed
 from iowbc.live.drag import Drag
 from iowbc.live.drawing import VIEW, GameMarks
 from iowbc.live.moment import Moment, MomentRecorder
 from iowbc.recipe.evaluation.evaluation import Success
 from iowbc.robot.description import GRAVITY, Robot
+from iowbc.task.record.signals import RECORDED
 from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv
 

@@ -23,7 +23,8 @@ from iowbc.task.layout import full_layout
 from iowbc.task.motion import Motion
 from iowbc.task.planned_pushes import PlannedPulls, PlannedPushes
 from iowbc.task.privileged import Truth
-from iowbc.task.record import recorder
+from iowbc.task.record import statistics
+from iowbc.task.record.signals import Recorded, write_signals
 from iowbc.task.schedule import Schedule
 from iowbc.task.vector.shared import Buffers
 
@@ -88,14 +89,9 @@ class Batch:
         for name in ("reward", "done", "truncated", "terminal_observation"):
             self.buffers[name][:] = 0
         self._observe(moved)
-        recorder.write_signals(
-            self.buffers,
-            self.simulation.state,
-            moved,
-            self.memory,
-            Ending(*np.zeros((5, self.n), np.bool_)),
-            self.period,
-        )
+        nothing, ending = np.zeros((self.n, len(self.robot.support))), Ending(*np.zeros((5, self.n), np.bool_))
+        step = Recorded(self.simulation, moved, self.memory, ending, nothing, self.period)
+        write_signals(self.buffers, step, planned=False)
 
     def reseed(self, seeds: NDArray[np.uint64]) -> None:
         """Reseeds all random number streams from seeds (n,)."""
@@ -128,17 +124,15 @@ class Batch:
             resistance=simulation.drawn["rolling_resistance"],
         )
         self.record(judgement, action)
-        memory.earlier_action[:], memory.action[:] = memory.action, action
         self.guidance.advance(memory, self._schedule.episode_key, self.simulation.measured)
         self.finish(judgement)
 
     def record(self, judgement: Judgement, action: Array) -> None:
         """Writes signals and counters of the step just made with an action (n, 15)."""
-        simulation, ending = self.simulation, judgement.ending
-        recorder.count_step(self.buffers, judgement, self.memory)
-        recorder.write_signals(self.buffers, simulation.state, judgement.motion, self.memory, ending, self.period)
-        if self._schedule.repeats:
-            recorder.write_trial_signals(self.buffers, simulation, action * self._scale)
+        statistics.count_step(self.buffers, judgement, self.memory)
+        motion, ending, correction = judgement.motion, judgement.ending, action * self._scale
+        step = Recorded(self.simulation, motion, self.memory, ending, correction, self.period)
+        write_signals(self.buffers, step, planned=self._schedule.repeats)
 
     def feed_partner(self, feed: Array) -> None:
         """Writes the entries of the command that the partner receives, (n, 4)."""
@@ -162,7 +156,7 @@ class Batch:
         buffers["terminal_observation"][which] = buffers["observation"][which]
         buffers["episode_return"][which] = memory.total[which]
         buffers["episode_length"][which] = memory.steps[which]
-        recorder.count_endings(buffers, ending, self._schedule.causes(ending), which)
+        statistics.count_endings(buffers, ending, self._schedule.causes(ending), which)
         self._schedule.promote(ending, which)
         self._observe(self.begin(which), which)
 
@@ -175,7 +169,7 @@ class Batch:
         self.simulation.hold(self._schedule.scales(which, key), which)
         self.simulation.reset(which, joints, base_pitch=pitch, key=key)
         memory.infeasible[which] = self.simulation.infeasible[which]
-        recorder.count_pushes(self.buffers, self._pushing, memory, which)
+        statistics.count_pushes(self.buffers, self._pushing, memory, which)
         moved = self.judge.motion(self.simulation.state)
         memory.heading_reference[which] = moved.heading[which]
         memory.heading_offset[which] = (self.simulation.measured.heading[:, 0] - moved.heading)[which]

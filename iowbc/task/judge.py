@@ -99,6 +99,7 @@ class Judge:
             ended=ending.failed,
         )
         terms, tracking = self._reward(step, ending.diverged, memory.played[:, LOCOMOTION])
+        memory.earlier_action[:], memory.action[:] = memory.action, action
         return Judgement(moved, ending, terms, tracking, error)
 
     def _filter(self, memory: EpisodeState, moved: Motion, resistance: Array) -> None:

@@ -7,7 +7,7 @@ import pytest
 from made_up_trials import DT, trace
 
 from iowbc.evaluation.trials.interaction import interaction_metrics, push_metrics
-from iowbc.evaluation.trials.trace import Trace
+from iowbc.task.record.signals import Trace
 
 WINDOW = 40
 

@@ -9,10 +9,10 @@ from made_up_trials import DT, GAIT_STEPS, RECIPE, ROBOT, outcome, script, trace
 
 from iowbc.evaluation.trials.errors import ERRORS, error_norm, moving_average
 from iowbc.evaluation.trials.metrics import effort_metrics, jerk, second_difference, trial_metrics
-from iowbc.evaluation.trials.trace import Trace
 from iowbc.robot.rotations import wrapped
 from iowbc.task.commands.script import CommandScript
 from iowbc.task.episodes import Episode
+from iowbc.task.record.signals import Trace
 
 
 def metrics_of(signals: Trace, commands: CommandScript | None = None, strength: float = 1.0) -> dict[str, float]:

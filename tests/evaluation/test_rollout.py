@@ -8,10 +8,11 @@ import pytest
 from numpy.typing import NDArray
 
 from iowbc.errors import Interrupted
-from iowbc.evaluation.trials.rollout import RECORDED, play_in
-from iowbc.task.record.signals import SIGNALS, trial_signals
+from iowbc.evaluation.trials.rollout import play_in
+from iowbc.robot.description import load_robot, robot_folder
+from iowbc.task.record.signals import RECORDED, signal_sizes
 
-WIDTHS = SIGNALS | trial_signals(29, 15)
+WIDTHS = signal_sizes(load_robot(robot_folder("g1")), planned=True)
 
 
 class CountingEnvironment:

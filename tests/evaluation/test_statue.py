@@ -8,6 +8,7 @@ import pytest
 from made_up_trials import DT, outcome, trace
 
 from iowbc.evaluation.trials.metrics import trial_metrics
+from iowbc.evaluation.trials.outcome import Outcome
 from iowbc.evaluation.trials.plan import (
     Trial,
     case_trials,
@@ -18,7 +19,6 @@ from iowbc.evaluation.trials.plan import (
 )
 from iowbc.evaluation.trials.protocol import evaluated_world
 from iowbc.evaluation.trials.table import succeeded
-from iowbc.evaluation.trials.trace import Outcome
 from iowbc.recipe.reading.loading import load_recipe
 from iowbc.robot.description import GRAVITY, load_robot, robot_folder
 from iowbc.task.specification import Specification

@@ -11,7 +11,8 @@ from task_worlds import actions, rollout
 from iowbc.recipe.recipe import Recipe
 from iowbc.task.curriculum import AXES
 from iowbc.task.gym.environment import Environment
-from iowbc.task.record.signals import CAUSES, ERRORS, KINDS, REASONS, SIGNALS
+from iowbc.task.record.signals import signal_sizes
+from iowbc.task.record.statistics import CAUSES, ERRORS, KINDS, REASONS
 from iowbc.task.rewards.table import TERMS
 from iowbc.task.vector.vector_env import VectorEnv
 
@@ -128,7 +129,8 @@ def test_observations_and_actions_fit_their_spaces(make: Make) -> None:
     assert observation.shape == (4, env.layout.size) == (4, *env.observation_space.shape)
     assert observation.dtype == np.float32
     assert env.action_space.shape == (15,)
-    assert {name: values.shape for name, values in env.signals.items()} == {k: (4, v) for k, v in SIGNALS.items()}
+    sizes = signal_sizes(env.batch.robot, planned=False)
+    assert {name: values.shape for name, values in env.signals.items()} == {k: (4, v) for k, v in sizes.items()}
     assert env.layout.observation.stop == env.layout.privileged.start
 
 

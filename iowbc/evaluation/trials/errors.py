@@ -6,9 +6,9 @@ import numpy as np
 
 from iowbc.arrays import Array, Mask
 from iowbc.control.command import HEIGHT, PITCH, YAW_RATE
-from iowbc.evaluation.trials.trace import Trace
 from iowbc.recipe.task.commands import Commands
 from iowbc.robot.rotations import wrapped
+from iowbc.task.record.signals import Trace
 
 ERRORS = ("E_alpha", "E_h", "E_v", "E_psi")
 """The paper's four errors in the order of its columns: torso pitch [rad], height [m], velocity [m/s], heading [rad]."""

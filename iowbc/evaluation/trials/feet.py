@@ -3,7 +3,7 @@
 import numpy as np
 
 from iowbc.arrays import Mask
-from iowbc.evaluation.trials.trace import Trace
+from iowbc.task.record.signals import Trace
 
 SHORTEST_WALK = 0.5
 """Minimum walked distance for slip per metre [m]."""

@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 
 from iowbc.arrays import Array
-from iowbc.evaluation.trials.trace import Trace
 from iowbc.robot.rotations import turned
 from iowbc.task.episodes import PlannedPull
+from iowbc.task.record.signals import Trace
 
 
 class Apparent(NamedTuple):

@@ -5,7 +5,7 @@ import numpy as np
 from iowbc.arrays import Array
 from iowbc.evaluation.trials.errors import moving_average
 from iowbc.evaluation.trials.feet import HIGH
-from iowbc.evaluation.trials.trace import Trace
+from iowbc.task.record.signals import Trace
 
 SETTLING = 1.0
 """Initial time excluded while the load is taken up [s]."""

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
-from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,17 +9,16 @@ from numpy.typing import NDArray
 
 from iowbc.arrays import Array
 from iowbc.errors import Interrupted
-from iowbc.evaluation.trials.trace import Outcome, Trace
+from iowbc.evaluation.trials.outcome import Outcome
 from iowbc.learning.acting import Policy
 from iowbc.task.episodes import Episode
+from iowbc.task.record.signals import RECORDED, Trace
 from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv
 
 if TYPE_CHECKING:
     import pandas as pd
 
-RECORDED = tuple(field.name for field in fields(Trace) if field.name != "dt")
-"""Names of the signals in a trace."""
 INTERRUPT_CHECK_INTERVAL = 25
 """Control steps between checks for an interrupt."""
 

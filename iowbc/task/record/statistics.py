@@ -1,19 +1,80 @@
-"""Training statistics computed from the counters of the environments."""
+"""Counters of each step and episode, and the training statistics computed from them."""
 
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
-from iowbc.arrays import Array
+from iowbc.arrays import Array, Mask
+from iowbc.control.command import HEIGHT, PITCH, VELOCITY, YAW_RATE
 from iowbc.task.curriculum import AXES
-from iowbc.task.record.signals import CAUSES, COUNTERS, ERRORS, KINDS, REASONS
+from iowbc.task.endings import Ending
+from iowbc.task.episode_state import EpisodeState
+from iowbc.task.judge import Judgement
+from iowbc.task.vector.shared import Buffers
 
+REASONS = ("fallen", "dropped", "lagging", "time_limit", "diverged")
+"""Reasons for the end of an episode."""
+CAUSES = ("walking", "standing", "disturbed")
+"""Situations in which a robot falls: walking, standing, or just after a disturbance."""
+KINDS = ("standing", "walking")
+"""Kinds of command."""
+ERRORS = ("velocity", "heading", "height", "pitch")
+"""Tracking errors: the norm of v_sys - v_coll in the plane, filtered [m/s], heading [rad], height [m], pitch [rad]."""
+COUNTERS = (
+    *("steps", "tracking", "episodes", "length", "return", *REASONS),
+    *(f"fell/{cause}" for cause in CAUSES),
+    *("pushes", "infeasible"),
+    *(f"{kind}/{name}" for kind in KINDS for name in ("steps", *ERRORS)),
+)
+"""Columns of the statistics: sums since they were last read. Length in steps, errors absolute."""
+COLUMN = {name: index for index, name in enumerate(COUNTERS)}
+STANDING, WALKING = (slice(COLUMN[f"{kind}/steps"], COLUMN[f"{kind}/{ERRORS[-1]}"] + 1) for kind in KINDS)
+"""Columns of steps and errors."""
 EPISODIC = (
     *("episode_seconds", "episode_return"),
     *(f"terminations/{reason}" for reason in REASONS),
     *(f"falls/{cause}" for cause in CAUSES),
 )
 """Statistics of finished episodes; if none finished, the last values are kept."""
+
+
+def count_step(buffers: Buffers, judgement: Judgement, memory: EpisodeState) -> None:
+    counters, tracking = buffers["counters"], judgement.tracking
+    buffers["terms"][:] += judgement.terms
+    counters[:, COLUMN["steps"]] += 1.0
+    counters[:, COLUMN["tracking"]] += tracking.sum(axis=1) / tracking.shape[1]
+    moved, command = judgement.motion, memory.command
+    errors = np.empty((len(command), 1 + len(ERRORS)))
+    errors[:, 0] = 1.0
+    away = memory.filtered_velocity[:, :YAW_RATE] - command[:, :YAW_RATE]
+    errors[:, 1] = np.sqrt(np.square(away).sum(axis=1))
+    errors[:, 2] = judgement.heading_error
+    errors[:, 3] = moved.height - command[:, HEIGHT]
+    errors[:, 4] = moved.torso_pitch - command[:, PITCH]
+    np.abs(errors, out=errors)
+    walking = command[:, VELOCITY].any(axis=1, keepdims=True)
+    counters[:, STANDING] += errors * ~walking
+    counters[:, WALKING] += errors * walking
+
+
+def count_endings(buffers: Buffers, ending: Ending, causes: dict[str, Mask], which: NDArray[np.intp]) -> None:
+    """Adds the episodes that ended, (k,), to the counters; `causes` of falls by name, (n,)."""
+    counters = buffers["counters"]
+    counters[which, COLUMN["episodes"]] += 1.0
+    counters[which, COLUMN["length"]] += buffers["episode_length"][which]
+    counters[which, COLUMN["return"]] += buffers["episode_return"][which]
+    for cause, found in causes.items():
+        counters[which, COLUMN[f"fell/{cause}"]] += found[which]
+    for reason, found in ending.reasons().items():
+        counters[which, COLUMN[reason]] += found[which]
+
+
+def count_pushes(buffers: Buffers, pushing: Mask, memory: EpisodeState, which: NDArray[np.intp]) -> None:
+    """Counts the pushes that begin, (k,), and the infeasible ones; `pushing`: environments with a push scene, (n,)."""
+    counters = buffers["counters"]
+    counters[which, COLUMN["pushes"]] += pushing[which]
+    counters[which, COLUMN["infeasible"]] += memory.infeasible[which]
 
 
 class Statistics:

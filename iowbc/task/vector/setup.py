@@ -10,7 +10,8 @@ from iowbc.robot.description import load_robot
 from iowbc.task.batch import Batch
 from iowbc.task.episodes import Episode
 from iowbc.task.layout import full_layout
-from iowbc.task.record.signals import COUNTERS, SIGNALS, trial_signals
+from iowbc.task.record.signals import signal_sizes
+from iowbc.task.record.statistics import COUNTERS
 from iowbc.task.rewards.reward import term_names
 from iowbc.task.specification import Specification
 from iowbc.task.vector.shared import Buffers, Fields
@@ -43,7 +44,7 @@ class Setup:
         recipe, robot = self.specification.recipe, load_robot(self.specification.robot)
         observation, support, public = full_layout(recipe, robot).size, len(robot.support), recipe.eval.public
         action = support + (len(robot.interaction) if public is not None and public.moves_arms else 0)
-        signals = SIGNALS if self.episodes is None else SIGNALS | trial_signals(len(robot.joints), support)
+        signals = signal_sizes(robot, planned=self.episodes is not None)
         return {
             "action": ((action,), "float32"),
             "observation": ((observation,), "float32"),

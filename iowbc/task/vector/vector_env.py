@@ -19,8 +19,8 @@ from iowbc.task.curriculum import AXES
 from iowbc.task.episodes import Episode
 from iowbc.task.layout import full_layout
 from iowbc.task.own_parts import load_parts
-from iowbc.task.record.signals import REASONS, SIGNALS
-from iowbc.task.record.statistics import Statistics
+from iowbc.task.record.signals import SIGNALS
+from iowbc.task.record.statistics import REASONS, Statistics
 from iowbc.task.rewards.reward import load_terms, term_names
 from iowbc.task.specification import Specification
 from iowbc.task.vector.setup import Setup

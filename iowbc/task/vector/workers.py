@@ -19,7 +19,7 @@ from typing import Any, Protocol
 from iowbc.errors import WorkerFailed
 from iowbc.processes import SINGLE_THREADED
 from iowbc.rollouts.blocks import shares_in_blocks
-from iowbc.task.record.signals import COUNTERS
+from iowbc.task.record.statistics import COUNTERS
 from iowbc.task.vector.shared import Buffers, Fields, create_shared, private_buffers
 from iowbc.task.vector.worker import ASKED, Message
 
