@@ -182,6 +182,19 @@ def sentences(section: type[BaseModel]) -> dict[str, str]:
     return found
 
 
+def marked_fields(section: Section, path: str, mark: Any) -> Iterator[tuple[str, Any]]:
+    """Dotted path and value of every field below a section whose type is annotated with `mark`."""
+    fields = type(section).model_fields
+    for name in (*fields, *(section.model_extra or ())):
+        value, here = getattr(section, name), f"{path}.{name}"
+        if name in fields and mark in fields[name].metadata:
+            yield here, value
+        items = [(f"{here}.{number}", item) for number, item in enumerate(value)] if isinstance(value, tuple) else []
+        for place, item in ((here, value), *items):
+            if isinstance(item, Section):
+                yield from marked_fields(item, place, mark)
+
+
 class InconsistentValues(ValueError):
     """Inconsistent values of a section; see `Section.problems`."""
 
