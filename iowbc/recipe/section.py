@@ -36,12 +36,20 @@ def _ascending(values: tuple[float, ...]) -> tuple[float, ...]:
     return values
 
 
+def _distinct(values: tuple[Any, ...]) -> tuple[Any, ...]:
+    if len(set(values)) != len(values):
+        raise ValueError(f"must differ, or trials would count more than once; got {list(values)}")
+    return values
+
+
 Range = Annotated[tuple[float, float], AfterValidator(in_order)]
 """Lower and upper end."""
 Ascending = Annotated[tuple[PositiveFloat, ...], AfterValidator(_ascending), Field(min_length=1)]
 """Positive values that ascend without repetition."""
 Masses = Annotated[tuple[Annotated[float, Field(ge=0)], ...], AfterValidator(_ascending)]
 """Masses [kg] that ascend without repetition."""
+Distinct = AfterValidator(_distinct)
+"""Marks tuples whose values must differ from each other."""
 Positive = Annotated[float, Field(gt=0)]
 NonNegative = Annotated[float, Field(ge=0)]
 PositiveRange = Annotated[tuple[PositiveFloat, PositiveFloat], AfterValidator(in_order)]

@@ -8,7 +8,7 @@ from pydantic import ValidationError
 
 from iowbc.recipe.evaluation.evaluation import Evaluation
 from iowbc.recipe.evaluation.sequences import Segment
-from iowbc.recipe.evaluation.suites import HeavyCase, MassSweep, PushLadder
+from iowbc.recipe.evaluation.suites import Compliance, HeavyCase, MassSweep, PushLadder
 from iowbc.recipe.export import Acceptance
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.simulation.holding import HOLDABLE, SCENES
@@ -113,6 +113,28 @@ def test_what_no_trial_could_hold_is_refused(held: dict[str, float], text: str) 
     with pytest.raises(ValidationError, match=text):
         MassSweep(fixed=held)
     MassSweep(fixed={"gyro_bias": -0.01, "stopping_reverse": -0.5, "object_com_offset_y": -0.1})
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"masses": [4, 4]},
+        {"behaviours": ["path", "path"]},
+        {"partner_shares": [0.5, 0.5]},
+        {"impedance": {"directions": ["x", "x"]}},
+        {"impedance": {"frequencies": [1, 1]}},
+    ],
+)
+def test_what_would_count_trials_twice_is_refused(given: dict[str, Any]) -> None:
+    with pytest.raises(ValidationError, match="must differ, or trials would count more than once"):
+        Compliance.model_validate(given)
+
+
+def test_a_push_after_the_end_of_its_trial_is_refused() -> None:
+    """The robot would survive every impulse."""
+    with pytest.raises(ValidationError, match=r"time: a push from 8 to 8.1 s is not within the 8 s"):
+        PushLadder(time=8.0)
+    PushLadder(time=7.0, duration=1.0)
 
 
 def test_a_delay_held_beyond_the_simulations_delay_lines_is_refused() -> None:
