@@ -35,11 +35,7 @@ class ArmKinematics(Constants):
     """Both arms from the torso frame to the wrist sites; joints as in the interaction branch, left, then right."""
 
     def __init__(self, robot: Robot, settings: ArmReference | None = None) -> None:
-        names = [robot.joints[index] for index in robot.interaction]
         chains, waist = arm_chains(robot)
-        order = [names.index(body.hinge.name) for chain in chains for body in chain if body.hinge is not None]
-        if order != list(range(len(names))):
-            raise ValueError(f"{robot.folder}: the arm joints must be the left chain followed by the right one")
         self.rest = robot.default_position[robot.interaction]
         self.settings = settings = settings or ArmReference()
         own = robot.velocity_limit[robot.interaction]

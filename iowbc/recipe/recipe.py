@@ -12,6 +12,7 @@ from iowbc.recipe.export import Export
 from iowbc.recipe.generator import ReferenceGenerator
 from iowbc.recipe.scene_names import scene_name_problems
 from iowbc.recipe.section import Section
+from iowbc.recipe.simulation.holding import held_delay_problems
 from iowbc.recipe.simulation.simulation import SimulationSettings
 from iowbc.recipe.skill.skill import Skill
 from iowbc.recipe.task.task import Task
@@ -94,6 +95,7 @@ class Recipe(Section):
             )
             yield "task.references.height", text
         yield from scene_name_problems(self)
+        yield from held_delay_problems(self.eval, "eval", self.eval.simulation or self.simulation)
 
     @field_validator("stages")
     @classmethod

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from iowbc.errors import nearest
 from iowbc.recipe.evaluation.evaluation import TrialScene
-from iowbc.recipe.section import Section
+from iowbc.recipe.section import marked_fields
 from iowbc.recipe.simulation.holding import WITH_OBJECT
 from iowbc.recipe.simulation.scene import Scenes
 from iowbc.recipe.task.task import Task
@@ -29,12 +29,16 @@ def scene_name_problems(recipe: "Recipe") -> Iterator[tuple[str, str]]:
         for name in scenes.own:
             yield from _incomplete(f"{path}.{name}", name, scenes, task)
     others = ((f"teacher.check.others.{name}", name) for name in recipe.teacher.check.others)
-    for place, name in (*others, *_object_scenes(recipe.export, "export"), *_object_scenes(recipe.skill, "skill")):
+    for place, name in (
+        *others,
+        *marked_fields(recipe.export, "export", WITH_OBJECT),
+        *marked_fields(recipe.skill, "skill", WITH_OBJECT),
+    ):
         yield from _without_object(place, name, "simulation.scenes", simulation.scenes)
     path, scenes = list(worlds.items())[-1]
     if evaluation.scenes:
         path, scenes = f"{path} and eval.scenes", with_scenes(scenes, evaluation.scenes)
-    for place, name in _object_scenes(evaluation, "eval"):
+    for place, name in marked_fields(evaluation, "eval", WITH_OBJECT):
         yield from _without_object(place, name, path, scenes)
 
 
@@ -68,18 +72,3 @@ def _without_object(path: str, name: str, where: str, scenes: Scenes) -> Iterato
     if name not in loaded:
         text = f"no scene {name!r} with an object; valid: {', '.join(loaded)}; a mass of 0 is without one"
         yield path, f"{text}; see {where}{nearest(name, loaded)}"
-
-
-def _object_scenes(section: Section, path: str) -> Iterator[tuple[str, str]]:
-    """Dotted path and value of every field below a section that names a scene with an object."""
-    fields = type(section).model_fields
-    for name in (*fields, *(section.model_extra or ())):
-        value, here = getattr(section, name), f"{path}.{name}"
-        if name in fields and WITH_OBJECT in fields[name].metadata:
-            yield here, value
-        elif isinstance(value, Section):
-            yield from _object_scenes(value, here)
-        elif isinstance(value, tuple):
-            for number, item in enumerate(value):
-                if isinstance(item, Section):
-                    yield from _object_scenes(item, f"{here}.{number}")

@@ -36,12 +36,20 @@ def _ascending(values: tuple[float, ...]) -> tuple[float, ...]:
     return values
 
 
+def _distinct(values: tuple[Any, ...]) -> tuple[Any, ...]:
+    if len(set(values)) != len(values):
+        raise ValueError(f"must differ, or trials would count more than once; got {list(values)}")
+    return values
+
+
 Range = Annotated[tuple[float, float], AfterValidator(in_order)]
 """Lower and upper end."""
 Ascending = Annotated[tuple[PositiveFloat, ...], AfterValidator(_ascending), Field(min_length=1)]
 """Positive values that ascend without repetition."""
 Masses = Annotated[tuple[Annotated[float, Field(ge=0)], ...], AfterValidator(_ascending)]
 """Masses [kg] that ascend without repetition."""
+Distinct = AfterValidator(_distinct)
+"""Marks tuples whose values must differ from each other."""
 Positive = Annotated[float, Field(gt=0)]
 NonNegative = Annotated[float, Field(ge=0)]
 PositiveRange = Annotated[tuple[PositiveFloat, PositiveFloat], AfterValidator(in_order)]
@@ -180,6 +188,19 @@ def sentences(section: type[BaseModel]) -> dict[str, str]:
             case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(value=ast.Constant(value=str(text))):
                 found[name] = inspect.cleandoc(text)
     return found
+
+
+def marked_fields(section: Section, path: str, mark: Any) -> Iterator[tuple[str, Any]]:
+    """Dotted path and value of every field below a section whose type is annotated with `mark`."""
+    fields = type(section).model_fields
+    for name in (*fields, *(section.model_extra or ())):
+        value, here = getattr(section, name), f"{path}.{name}"
+        if name in fields and mark in fields[name].metadata:
+            yield here, value
+        items = [(f"{here}.{number}", item) for number, item in enumerate(value)] if isinstance(value, tuple) else []
+        for place, item in ((here, value), *items):
+            if isinstance(item, Section):
+                yield from marked_fields(item, place, mark)
 
 
 class InconsistentValues(ValueError):

@@ -75,6 +75,8 @@ LARGEST_UPDATE = 10_000_000
 class HistoryNetwork(Encoder):
     """The student's network trained by PPO directly, without a teacher (the paper's "w/o distillation")."""
 
+    withdrawn: ClassVar[Mapping[str, Any]] = {"experts": {}, "imitation": 0.1}
+
     length: int = Field(default=25, ge=2, le=1000)
     """Length of the observation history H_t (paper Table I)."""
     estimate: bool = Field(default=False, json_schema_extra=LATER)

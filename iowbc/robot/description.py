@@ -15,6 +15,7 @@ from iowbc.robot.mjcf import Hinge, Tree, read_tree, small_text
 GRAVITY = 9.81
 """Acceleration of gravity [m/s²], as MuJoCo and pinocchio have it by default."""
 DESCRIPTION = "robot.yaml"
+NEEDED = ("name", "mjcf", "base", "torso", "soles", "wrists", "support", "joints")
 ROW_KEYS = frozenset({"kp", "kd", "velocity", "default", "scale", "mirrored"})
 
 
@@ -124,10 +125,12 @@ def load_robot(folder: Path) -> Robot:
 def _described(folder: Path, entries: Any) -> Robot:
     if not isinstance(entries, Mapping):
         raise ValueError(f"expected a mapping of entries, found {type(entries).__name__}")
-    needed = ("name", "mjcf", "base", "torso", "soles", "wrists", "support", "joints")
-    missing = [key for key in needed if key not in entries]
+    missing = [key for key in NEEDED if key not in entries]
     if missing:
         raise ValueError(f"missing {', '.join(missing)}")
+    unknown = [str(key) for key in entries if key not in (*NEEDED, "linkages")]
+    if unknown:
+        raise ValueError(f"unknown entry {', '.join(unknown)}; valid: {', '.join(NEEDED)}, linkages")
     mjcf = folder / entries["mjcf"]
     if mjcf.name != entries["mjcf"]:
         raise ValueError(f"mjcf: {shown(entries['mjcf'])} is not the name of a file in this folder")
@@ -157,6 +160,17 @@ def _described(folder: Path, entries: Any) -> Robot:
     wrists, soles = _pair(entries, "wrists"), _pair(entries, "soles")
     grips, sole_bodies = [tree.carrier(site) for site in wrists], [tree.body_of_site(site) for site in soles]
     waist = tree.hinges_between(entries["torso"], entries["base"])
+    legs = _sides("soles", [tree.hinges_between(body.name, entries["base"]) for body in sole_bodies])
+    arms = _sides("wrists", [tree.hinges_between(body.name, entries["torso"]) for body, _ in grips])
+    others = [name for index, name in enumerate(joints) if index not in support]
+    if others != arms or not set(legs) <= {joints[index] for index in support}:
+        text = f"legs and waist belong to it, and no joint of the arms {', '.join(arms)}"
+        raise ValueError(
+            f"support: {text}; outside of it are {', '.join(others)}, expected the left, then the right arm"
+        )
+    few = [body.name for body in sole_bodies if len(body.feet) < 3 or len(body.feet) != len(sole_bodies[0].feet)]
+    if few:
+        raise ValueError(f"soles: {few[0]} needs a geom of class foot at each corner, the same number on both sides")
     posture = dict(zip(joints, default.tolist(), strict=True))
     return Robot(
         folder=folder,
@@ -209,6 +223,9 @@ def _row(rows: Mapping[str, Mapping[str, Any]], joint: str) -> Mapping[str, Any]
             f"joints.{kind_of(joint)}: unknown {sorted(unknown)}, missing {sorted(absent)}; "
             f"a row has {', '.join(sorted(ROW_KEYS))}"
         )
+    for key in sorted({"kp", "kd", "velocity", "scale"} & set(row)):
+        if not (isinstance(row[key], int | float) and 0.0 <= row[key] < np.inf and (row[key] or key == "kd")):
+            raise ValueError(f"joints.{kind_of(joint)}.{key}: is {shown(row[key])}, expected a positive number")
     return row
 
 
@@ -236,6 +253,18 @@ def _places(hinges: Sequence[Hinge], support: Indices, joints: tuple[str, ...]) 
     if missing:
         raise ValueError(f"support: joints of legs and waist belong to it, missing {', '.join(missing)}")
     return np.array([names.index(hinge.name) for hinge in hinges], dtype=np.int64)
+
+
+def _sides(key: str, chains: Sequence[Sequence[Hinge]]) -> list[str]:
+    """Joints of the left, then of the right chain. Raises ValueError where their names are not those of a left and a
+    right side, by which the mirror maps pair them."""
+    left, right = ([hinge.name for hinge in chain] for chain in chains)
+    if not all(name.startswith("left_") for name in left) or right != [f"right_{name[5:]}" for name in left]:
+        text = "expected the same joints on both sides, named left_... and right_..."
+        raise ValueError(
+            f"{key}: the left one is moved by {', '.join(left)}, the right one by {', '.join(right)}; {text}"
+        )
+    return [*left, *right]
 
 
 def _pair(entries: Mapping[str, Any], key: str) -> tuple[str, str]:

@@ -164,6 +164,8 @@ def read_tree(path: Path) -> Tree:
     world = root.find("worldbody")
     if world is None:
         raise ValueError(f"{path}: no <worldbody>")
+    if world.find("body/freejoint") is None or root.find("actuator") is not None:
+        raise ValueError(f"{path}: expected a <freejoint> in the base, and no <actuator>: the program adds motors")
     bodies = {body.name: body for child in world.findall("body") for body in _bodies(child, None, path)}
     excluded = frozenset(
         frozenset((pair.attrib["body1"], pair.attrib["body2"])) for pair in root.findall("contact/exclude")
@@ -175,14 +177,16 @@ def _bodies(element: ElementTree.Element, parent: str | None, path: Path) -> Ite
     name = element.attrib.get("name")
     if name is None:
         raise ValueError(f"{path}: a body inside {parent or 'the world'!r} has no name")
-    joint, inertial, geoms = element.find("joint"), element.find("inertial"), element.findall("geom")
+    joints, inertial, geoms = element.findall("joint"), element.find("inertial"), element.findall("geom")
+    if len(joints) > 1 or any(joint.get("type", "hinge") != "hinge" for joint in joints):
+        raise ValueError(f"{path}: body {name!r}: expected one hinge at most")
     feet = [_numbers(geom, "pos", "0 0 0")[:2] for geom in geoms if geom.get("class") == "foot"]
     yield Body(
         name=name,
         parent=parent,
         position=_numbers(element, "pos", "0 0 0"),
         quaternion=rotations.normalized(_numbers(element, "quat", "1 0 0 0")),
-        hinge=None if joint is None else _hinge(joint, path),
+        hinge=_hinge(joints[0], path) if joints else None,
         sites={site.attrib["name"]: _numbers(site, "pos", "0 0 0") for site in element.findall("site")},
         capsules=tuple(_capsule(geom) for geom in geoms if geom.get("class") == "body"),
         feet=np.array(feet).reshape(-1, 2),
@@ -198,6 +202,8 @@ def _hinge(element: ElementTree.Element, path: Path) -> Hinge:
         if needed not in element.attrib:
             raise ValueError(f"{path}: joint {element.attrib.get('name', '?')!r} lacks the attribute {needed!r}")
     axis, limits = _numbers(element, "axis", ""), _numbers(element, "range", "")
+    if not np.linalg.norm(axis) > 0.0:
+        raise ValueError(f"{path}: joint {element.attrib['name']!r} has the axis {element.attrib['axis']!r}")
     return Hinge(
         name=element.attrib["name"],
         axis=axis / np.linalg.norm(axis),

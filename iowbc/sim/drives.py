@@ -54,7 +54,8 @@ class Drives:
 
 
 def drawn_effort(robot: Robot, strength: Array, linkage_effort: Array) -> Array:
-    """Torque limits at low speed, (n, joints) [N·m]; drawn strengths (n, joints), limits of linkages (n, linkages)."""
+    """Torque limits at low speed, (n, joints) [N·m]; drawn strengths (n, joints), limits of linkages (n, linkages),
+    or (n,) of a single one."""
     effort, pairs = robot.effort * strength, robot.linkages
-    effort[:, pairs] = (linkage_effort * strength[:, pairs].mean(axis=2))[..., None]
+    effort[:, pairs] = (linkage_effort.reshape(len(strength), -1) * strength[:, pairs].mean(axis=2))[..., None]
     return effort

@@ -167,7 +167,8 @@ def _entries(recipe: Recipe, robot: Robot) -> dict[str, tuple[Distribution, int]
     if not randomization.enabled:
         entries = {name: (_off(value), width) for name, (value, width) in entries.items()}
     shares = {"partner_share": partner.share, PUSH_SHARE: partner.push_share}
-    entries |= {name: (value if partner.enabled else _off(value), 1) for name, value in shares.items()}
+    absent = Distribution(low=0.0, high=0.0, nominal=0.0)
+    entries |= {name: (value if partner.enabled else absent, 1) for name, value in shares.items()}
     for name in ("share_drift", "stiffness", "damping", "delay", "pace", "noise"):
         entries[f"partner_{name}"] = (getattr(partner, name), 1)
     return entries

@@ -51,7 +51,7 @@ class Partner:
         slowest = np.array([measured(thing).about_axes[1:].min() if thing else 1.0 for thing in things])
         self._least_inertia = np.array([thing.smallest_inertia if thing else 0.0 for thing in things])
         self._felt = 1.0 / (1.0 + (ahead * ahead + above * above) / slowest)
-        self._line = DelayLine(n, FEED, max(recipe.delay.high, recipe.delay.nominal, recipe.lagging.delay) / period)
+        self._line = DelayLine(n, FEED, recipe.longest_delay / period)
         self._stiffness, self._damping, self._weight = np.zeros(n), np.zeros(n), np.zeros(n)
         self._resistance, self._bound, self._pace, self._gust = np.zeros(n), np.zeros(n), np.ones(n), np.zeros(n)
         self._drift, self._share, self._wandering = np.zeros(n), np.zeros(n), np.zeros(n)

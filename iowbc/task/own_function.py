@@ -2,8 +2,10 @@
 
 import functools
 import linecache
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib.util import decode_source
 from types import FunctionType, ModuleType
 from typing import Any
 
@@ -61,7 +63,7 @@ def load_function(path: str, own: CustomFunction, contract: str) -> CheckedFunct
     where = f"{path}: {own.module.path}"
     try:
         module = _executed(own.module)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise StageFailed(f"{where}: cannot be executed: {_told(error, own.module)}") from error
     function = getattr(module, own.function, None)
     if not callable(function):
@@ -79,18 +81,19 @@ def _fits(found: tuple[int, ...], shape: ArrayShape) -> bool:
 @functools.cache
 def _executed(file: ModuleFile) -> Any:
     """The module of a file; its lines are shown in tracebacks."""
-    source = file.unpacked().decode("utf-8")
+    source = decode_source(file.unpacked())
     name = f"<{file.path} {file.sha256[:8]}>"
     linecache.cache[name] = (len(source), None, source.splitlines(keepends=True), name)
     module = ModuleType(f"iowbc_own_{file.sha256[:16]}")
+    sys.modules[module.__name__] = module  # dataclasses look their module up by its name
     exec(compile(source, name, "exec"), vars(module))
     return module
 
 
-def _told(error: Exception, file: ModuleFile) -> str:
+def _told(error: BaseException, file: ModuleFile) -> str:
     """Message of an error in the user's code, with the last line of the file in its traceback."""
     text = error.msg if isinstance(error, SyntaxError) else str(error)
-    lines = [error.lineno] if isinstance(error, SyntaxError) else []
+    lines = [error.lineno] if isinstance(error, SyntaxError) and error.lineno else []
     trace = error.__traceback__
     while trace is not None:
         if trace.tb_frame.f_code.co_filename == f"<{file.path} {file.sha256[:8]}>":

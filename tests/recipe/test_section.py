@@ -7,6 +7,7 @@ import pytest
 from pydantic import Field, ValidationError
 
 from iowbc.recipe.section import COSMETIC, LATER, Section, deciding
+from iowbc.recipe.teacher import HistoryNetwork
 
 
 class Inner(Section):
@@ -45,3 +46,10 @@ def test_a_withdrawn_field_may_keep_the_value_whose_behaviour_remains() -> None:
         Shorter.model_validate({"gone": 9})
     with pytest.raises(ValidationError, match="Extra inputs"):
         Inner.model_validate({"gone": 8})
+
+
+def test_the_published_specialist_is_read_without_its_withdrawn_fields() -> None:
+    """The resolved recipe of the published teacher of specialists/push.yaml still has them."""
+    assert HistoryNetwork.model_validate({"experts": {}, "imitation": 0.1}) == HistoryNetwork()
+    with pytest.raises(ValidationError, match="imitation was withdrawn"):
+        HistoryNetwork.model_validate({"imitation": 0.2})

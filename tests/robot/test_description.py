@@ -76,6 +76,79 @@ def test_an_unknown_column_of_a_joint_is_refused(folder: Path) -> None:
         load_robot(folder)
 
 
+@pytest.mark.parametrize(
+    ("file", "old", "new", "message"),
+    [
+        ("robot.yaml", "linkages:", "linkage:", r"unknown entry linkage; valid: name, .*, linkages"),
+        (
+            "robot.yaml",
+            "kp: 200, kd: 5.0, velocity: 20",
+            "kp: -200, kd: 5.0, velocity: 20",
+            r"joints\.knee\.kp: is -200",
+        ),
+        (
+            "robot.yaml",
+            "{kp: 200, kd: 5.0, velocity: 20",
+            "{kp: 200, kd: 5.0, velocity: 0",
+            r"knee\.velocity: is 0, exp",
+        ),
+        (
+            "robot.yaml",
+            "{kp: 50, kd: 2.0",
+            "{kp: stiff, kd: 2.0",
+            r"joints\.ankle_pitch\.kp: is 'stiff', expected a pos",
+        ),
+        (
+            "robot.yaml",
+            "[left_sole, right_sole]",
+            "[right_sole, left_sole]",
+            r"soles: the left one is moved by right_hip_p",
+        ),
+        ("robot.yaml", "[left_grip, right_grip]", "[left_grip, left_grip]", r"wrists: .* the right one by left_should"),
+        (
+            "robot.yaml",
+            "  - left_knee_joint\n",
+            "",
+            r"support: legs and waist .* outside of it are left_knee_joint, left_should",
+        ),
+        ("g1.xml", 'class="foot" pos', 'class="visual" pos', r"soles: left_ankle_roll_link needs a geom of class foot"),
+        ("g1.xml", "<freejoint", "<site", r"g1\.xml: expected a <freejoint>"),
+        ("g1.xml", "</mujoco>", "<actuator/></mujoco>", r"g1\.xml: expected .* no <actuator>"),
+        (
+            "g1.xml",
+            '<joint name="left_knee_joint"',
+            '<joint name="left_knee_joint" type="slide"',
+            r"expected one hinge",
+        ),
+        (
+            "g1.xml",
+            '<joint name="left_knee_joint" axis="0 1 0"',
+            '<joint name="left_knee_joint" axis="0 0 0"',
+            r"has the axis '0",
+        ),
+    ],
+)
+def test_what_no_stage_could_use_is_refused(folder: Path, file: str, old: str, new: str, message: str) -> None:
+    text = (folder / file).read_text()
+    assert old in text
+    (folder / file).write_text(text.replace(old, new))
+    with pytest.raises(ValueError, match=message):
+        load_robot(folder)
+
+
+def test_joints_without_a_side_in_their_name_are_refused(folder: Path) -> None:
+    """The mirror maps pair left and right by name; joints named otherwise would be their own mirror images."""
+    path = folder / "g1.xml"
+    path.write_text(path.read_text().replace('"right_knee_joint"', '"right_shin_joint"'))
+    path = folder / "robot.yaml"
+    text = path.read_text().replace("right_knee_joint", "right_shin_joint")
+    path.write_text(text + "  shin: {kp: 200, kd: 5.0, velocity: 20, default: 0.74, scale: 0.20}\n")
+    with pytest.raises(
+        ValueError, match=r"soles: .*right_shin_joint.* expected the same joints on both sides, named left"
+    ):
+        load_robot(folder)
+
+
 def test_a_damaged_mjcf_is_named(folder: Path) -> None:
     (folder / "g1.xml").write_text("<mujoco><worldbody>")
     with pytest.raises(ValueError, match=r"g1\.xml: not well-formed XML"):

@@ -1,5 +1,7 @@
 """What motors can give, and what their controllers take for true."""
 
+import dataclasses
+
 import mujoco
 import numpy as np
 import pytest
@@ -98,3 +100,12 @@ def test_weak_motors_weaken_the_linkages_that_they_move(robot):
     assert motors.effort[0, robot.linkages] == pytest.approx(32.0)
     others = np.setdiff1d(np.arange(len(robot.joints)), robot.linkages)
     assert motors.effort[0, others] == pytest.approx(0.8 * robot.effort[others])
+
+
+def test_a_robot_with_a_single_linkage_draws_its_limit_in_every_environment(robot, calm):
+    one = dataclasses.replace(robot, linkages=robot.linkages[:1])
+    simulation = Simulation(one, calm, envs=np.arange(3), seed=0, scenes=["free"] * 3)
+    simulation.reset(np.arange(3), np.tile(one.default_position, (3, 1)))
+    drawn = simulation.drawn["linkage_effort"]
+    assert drawn.shape == (3,)
+    assert simulation.motor_effort[:, one.linkages[0]] == pytest.approx(np.stack([drawn, drawn], axis=1))

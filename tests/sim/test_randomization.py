@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 from changes import changed
+from pydantic import ValidationError
 
+from iowbc.recipe.simulation.randomization import Distribution
 from iowbc.recipe.simulation.simulation import SimulationSettings as Recipe
 
 COUNT = 64
@@ -156,3 +158,33 @@ def test_the_loads_centre_is_held_along_one_axis_and_drawn_along_the_others(star
     assert np.ptp(offset[:, 2]) > 0.03
     free = start(Recipe(), ["free"], object_com_offset_y=0.08)
     assert not free.drawn["object_com_offset"].any(), "nothing has a centre where there is no object"
+
+
+def test_a_partner_who_is_not_enabled_bears_nothing_whatever_the_nominal_share(start):
+    recipe = changed(Recipe(), "partner.enabled", False)
+    for name in ("share", "push_share"):
+        recipe = changed(recipe, f"partner.{name}", Distribution(low=0.0, high=0.6, nominal=0.5))
+    assert (start(recipe, ["lift"] * 8 + ["push"] * 8).drawn["partner_share"] == 0.0).all()
+
+
+@pytest.mark.parametrize(
+    ("given", "text"),
+    [
+        (
+            {"randomization": {"light_share": 0.5, "object_mass_scale": {"low": 0, "high": 1, "nominal": 1}}},
+            "light_share",
+        ),
+        ({"randomization": {"light_share": 0.5, "light_end": 0.01}}, "light_share"),
+        ({"partner": {"damping": {"low": -1, "high": 1, "nominal": 0}}}, "partner.damping"),
+        ({"partner": {"stopping": {"duration": {"low": 0, "high": 1, "nominal": -1}}}}, "stopping.duration"),
+        ({"impulses": {"magnitude": {"low": -1, "high": 1, "nominal": 0}}}, "impulses.magnitude"),
+        ({"pushes": {"interval": {"low": -1, "high": 1, "nominal": 0}}}, "pushes.interval"),
+        (
+            {"scenes": {"tyre": {"kind": "lift", "object": {"shape": "tyre", "size": [0.2, 0.5, 0.6], "mass": 9}}}},
+            "tyre",
+        ),
+    ],
+)
+def test_ranges_that_nothing_can_have_are_refused(given, text):
+    with pytest.raises(ValidationError, match=text.rpartition(".")[2]):
+        Recipe.model_validate(given)

@@ -55,6 +55,7 @@ def test_with_a_width_it_is_a_kernel(opened: Open, tmp_path: Path) -> None:
         ),
         ("x = 1\ndef half(step:\n", r"cannot be executed: SyntaxError: .* in line 2"),
         ("import numpi\n", r"cannot be executed: ModuleNotFoundError: .*numpi.* in line 1"),
+        ("raise SystemExit(3)\n", r"cannot be executed: SystemExit: 3 in line 1"),
     ],
 )
 def test_a_file_that_cannot_be_used_is_named_before_processes_start(
@@ -62,6 +63,13 @@ def test_a_file_that_cannot_be_used_is_named_before_processes_start(
 ) -> None:
     with pytest.raises(StageFailed, match=f"task.reward.own.mine: rewards.py: {text}"):
         opened(own_recipe(tmp_path, source), workers=1)
+
+
+def test_its_file_may_define_dataclasses_and_begin_with_a_byte_order_mark(opened: Open, tmp_path: Path) -> None:
+    dataclass = "from dataclasses import dataclass\n\n\n@dataclass\nclass Scale:\n    half: float = 0.5\n"
+    env = opened(own_recipe(tmp_path, f"\ufefffrom __future__ import annotations\n{dataclass}{HALF}"))
+    rollout(env, 2)
+    assert env.statistics()["reward/own.mine"] == pytest.approx(1.5)
 
 
 @pytest.mark.parametrize(

@@ -127,6 +127,14 @@ def test_a_later_weight_of_no_term_is_refused() -> None:
         Reward.model_validate({"later": {"weights": {"sync.speed": 1.0}}})
 
 
+def test_later_weights_may_name_every_term_and_no_parameter_of_one() -> None:
+    given = {"yielding": {"held": 60.0, "pushed": 280.0}, "later": {"weights": dict.fromkeys(TERMS, 1.0)}}
+    RewardFunction(Reward.model_validate(given), 0.02)
+    for parameter in ("smooth.comfortable_effort", "gait.touchdown_height", "yielding.held"):
+        with pytest.raises(ValidationError, match=f"later.weights: no term '{parameter}'"):
+            Reward.model_validate({**given, "later": {"weights": {parameter: 1.0}}})
+
+
 def test_progress_counts_along_the_command_and_no_faster_than_it() -> None:
     command = np.array([[0.3, 0.4]] * 4 + [[0.0, 0.0]])
     velocity = np.array([[0.0, 0.0], [0.15, 0.2], [0.6, 0.8], [0.8, -0.6], [1.0, 1.0]])

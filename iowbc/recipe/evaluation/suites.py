@@ -6,11 +6,12 @@ from typing import Annotated, Literal, get_args
 from pydantic import Field, PositiveFloat
 
 from iowbc.recipe.evaluation.sequences import BOWING, PROBED, STAGNATION, STANDING, WALKING, WALKING_ON, Segment
-from iowbc.recipe.section import Ascending, Masses, Section
+from iowbc.recipe.section import Ascending, Distinct, Masses, Section
 from iowbc.recipe.simulation.holding import Held, ObjectScene
 from iowbc.recipe.simulation.partner import BEHAVIOURS
 
-PartnerShare = Annotated[float, Field(ge=-1, le=1)] | None
+Share = Annotated[float, Field(ge=-1, le=1)]
+PartnerShare = Share | None
 
 
 class SweepExtension(Section):
@@ -131,7 +132,7 @@ class PushLadder(Section):
     """Scene of `simulation.scenes`."""
     mass: float = Field(default=4.0, ge=0)
     """Object mass [kg]."""
-    directions: tuple[Direction, ...] = EIGHT
+    directions: Annotated[tuple[Direction, ...], Distinct] = EIGHT
     """Horizontal directions in the frame of the robot's heading."""
     trials: int | None = Field(default=5, ge=1, le=10_000)
     """Trials per impulse and direction; empty: `eval.trials`. Few suffice: neighbouring results support each other."""
@@ -143,6 +144,11 @@ class PushLadder(Section):
     """Duration of the push, a constant force [s]."""
     sequence: tuple[Segment, ...] = Field(default=STANDING, min_length=1)
     """Commands during the trial."""
+
+    def problems(self) -> Iterator[tuple[str, str]]:
+        end = sum(segment.duration for segment in self.sequence)
+        if self.time + self.duration > end:
+            yield "", f"time: a push from {self.time:g} to {self.time + self.duration:g} s is not within the {end:g} s"
 
 
 class Robustness(Section):
@@ -235,9 +241,9 @@ class Impedance(Section):
     """Scene of `simulation.scenes`."""
     mass: float = Field(default=4.0, gt=0)
     """Object mass [kg]."""
-    directions: tuple[Literal["x", "y"], ...] = Field(default=("x", "y"), min_length=1)
+    directions: Annotated[tuple[Literal["x", "y"], ...], Distinct] = Field(default=("x", "y"), min_length=1)
     """Directions of the pull: forward (x) and to the left (y) of the commanded heading."""
-    frequencies: tuple[PositiveFloat, ...] = Field(default=(0.2, 0.5, 1.0, 2.0), min_length=1)
+    frequencies: Annotated[tuple[PositiveFloat, ...], Distinct] = Field(default=(0.2, 0.5, 1.0, 2.0), min_length=1)
     """Frequencies [Hz]: from that of yielding to a leading partner to that of steps."""
     amplitude: float = Field(default=10.0, gt=0)
     """Amplitude of the force [N]; small compared with the partner's 80 N, large compared with balancing motion."""
@@ -257,11 +263,11 @@ class Compliance(Section):
 
     scene: ObjectScene = "lift"
     """Scene of `simulation.scenes`, with an object that is held."""
-    masses: tuple[PositiveFloat, ...] = Field(default=(4.0,), min_length=1)
+    masses: Annotated[tuple[PositiveFloat, ...], Distinct] = Field(default=(4.0,), min_length=1)
     """Object masses [kg]."""
-    partner_shares: tuple[float, ...] = Field(default=(0.5,), min_length=1)
+    partner_shares: Annotated[tuple[Share, ...], Distinct] = Field(default=(0.5,), min_length=1)
     """Fractions of the weight that the partner bears."""
-    behaviours: tuple[str, ...] = ("path", "follower", "leader", "stopping", "tugging", "lagging")
+    behaviours: Annotated[tuple[str, ...], Distinct] = ("path", "follower", "leader", "stopping", "tugging", "lagging")
     """Partner behaviours, one case each; the last two never occur in training."""
     trials: int | None = Field(default=None, ge=1, le=10_000)
     """Trials of each case; empty: `eval.trials`."""

@@ -5,10 +5,11 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator, Field
 
-from iowbc.recipe.section import Section
+from iowbc.recipe.section import Section, marked_fields
 from iowbc.recipe.simulation.partner import BEHAVIOURS, OWN_DRAWS, PartnerSettings
-from iowbc.recipe.simulation.randomization import Distribution, Randomization
+from iowbc.recipe.simulation.randomization import LATENCIES, POSITIVE, SIGNED, Distribution, Randomization
 from iowbc.recipe.simulation.scene import Scenes
+from iowbc.recipe.simulation.simulation import SimulationSettings
 
 SCENES = tuple(Scenes.model_fields)
 """Names of the built-in scenes."""
@@ -27,15 +28,18 @@ def _drawn(section: type[Section]) -> Iterator[str]:
 
 
 HOLDABLE = (
-    *_drawn(Randomization),
-    *(f"partner_{name}" for name in _drawn(PartnerSettings) if name != "push_share"),  # in a push it is the share
+    *(name for name in _drawn(Randomization) if name != "object_mass_scale"),
+    *(f"partner_{name}" for name in _drawn(PartnerSettings) if not name.endswith("share")),
     *(f"{section}_{name}" for section, kind in OWN_DRAWS.items() for name in _drawn(kind)),
     *SWITCHES,
     *BY_AXIS,
-    "object_mass",
     "partner_behaviour",
 )
-"""Names of all quantities that a trial may fix."""
+"""Names of all quantities that a trial may fix. Mass and the partner's share have fields of their own."""
+OF_EITHER_SIGN = (
+    *(*SIGNED, *BY_AXIS, "partner_pace", "leader_pace", "leader_turning", "leader_sideways", "leader_rise"),
+    *("stopping_reverse",),
+)
 
 
 def _with_object(name: str) -> str:
@@ -47,7 +51,13 @@ def _with_object(name: str) -> str:
 def _known_quantities(held: dict[str, float]) -> dict[str, float]:
     unknown = sorted(set(held) - set(HOLDABLE))
     if unknown:
-        raise ValueError(f"no randomised quantity {', '.join(unknown)}; valid: {', '.join(sorted(HOLDABLE))}")
+        own = "mass and partner_share are fields of their own"
+        raise ValueError(f"no randomised quantity {', '.join(unknown)}; valid: {', '.join(sorted(HOLDABLE))}; {own}")
+    for name, value in held.items():
+        if name == "partner_behaviour" and value not in range(len(BEHAVIOURS)):
+            raise ValueError(f"{name}: {value:g} is no behaviour; valid: {', '.join(BEHAVIOURS)}")
+        if (value < 0.0 and name not in OF_EITHER_SIGN) or (value == 0.0 and name in POSITIVE):
+            raise ValueError(f"{name}: {value:g} should be {'positive' if name in POSITIVE else '0 or more'}")
     return held
 
 
@@ -66,4 +76,20 @@ ObjectScene = Annotated[
     str, WITH_OBJECT, Field(json_schema_extra={"examples": [name for name in SCENES if name != FREE]})
 ]
 """Name of a scene with an object; the recipe may define further ones."""
-Held = Annotated[dict[str, float], AfterValidator(_known_quantities), BeforeValidator(_behaviour_by_name)]
+HELD = AfterValidator(_known_quantities)
+"""Marks the fields that fix random quantities."""
+Held = Annotated[dict[str, float], HELD, BeforeValidator(_behaviour_by_name)]
+
+
+def held_delay_problems(section: Section, path: str, simulation: SimulationSettings) -> Iterator[tuple[str, str]]:
+    """Delays below a section that are fixed beyond the delay lines of the simulation."""
+    longest = simulation.randomization.longest_latency
+    source = "simulation.randomization.longest_latency"
+    limits: dict[str, tuple[float, str]] = dict.fromkeys(LATENCIES, (longest, source))
+    source = "the longest of simulation.partner.delay and .lagging.delay"
+    limits["partner_delay"] = simulation.partner.longest_delay, source
+    for place, held in marked_fields(section, path, HELD):
+        for name in limits.keys() & held.keys():
+            limit, source = limits[name]
+            if held[name] > limit:
+                yield place, f"{name}: {held[name]:g} is above {limit:g}, {source}"

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from pydantic import Field
 
 from iowbc.recipe.section import LATER, Section
-from iowbc.recipe.simulation.randomization import Distribution
+from iowbc.recipe.simulation.randomization import Distribution, not_negative
 
 LONGEST_DELAY = 10.0
 """Longest delay that a recipe may draw [s]."""
@@ -59,6 +59,9 @@ class Stopping(Section):
     catching_up: float = Field(default=1.0, gt=0.0)
     """Time in which the partner returns to the handle after the stop [s]; otherwise it would hold back for ever."""
 
+    def problems(self) -> Iterator[tuple[str, str]]:
+        yield from not_negative(self, "begin", "duration")
+
 
 OWN_DRAWS: dict[str, type[Section]] = {"leader": Leader, "stopping": Stopping}
 """Sections of `PartnerSettings` with quantities drawn per episode."""
@@ -78,7 +81,7 @@ class Tugging(Section):
 class Lagging(Section):
     """A partner that reacts late and hardly damps."""
 
-    delay: float = Field(default=0.6, ge=0.0)
+    delay: float = Field(default=0.6, ge=0.0, le=LONGEST_DELAY)
     """Delay behind the commanded motion [s]: twice the largest that training draws."""
     damping: float = Field(default=0.25, ge=0.0)
     """Factor on the drawn damping."""
@@ -139,5 +142,11 @@ class PartnerSettings(Section):
     a force held over a control period would make a light object oscillate."""
 
     def problems(self) -> Iterator[tuple[str, str]]:
-        if not all(0.0 <= value <= LONGEST_DELAY for value in (self.delay.low, self.delay.high, self.delay.nominal)):
+        yield from not_negative(self, "share_drift", "stiffness", "damping", "delay", "noise")
+        if self.longest_delay > LONGEST_DELAY:
             yield "delay", f"should be 0 to {LONGEST_DELAY:g} s"
+
+    @property
+    def longest_delay(self) -> float:
+        """Longest delay that may be drawn or held [s]."""
+        return max(self.delay.high, self.delay.nominal, self.lagging.delay)

@@ -26,6 +26,14 @@ class Distribution(Interval):
             yield "", f"a log-uniform range must be positive, got low {self.low}"
 
 
+def not_negative(section: Section, *names: str) -> Iterator[tuple[str, str]]:
+    """Problems of a section whose distributions of these names have negative values."""
+    for name in names:
+        values = getattr(section, name)
+        if min(values.low, values.nominal) < 0.0:
+            yield name, "should be 0 or more"
+
+
 LATENCIES = ("action_latency", "sensor_latency", "object_latency")
 SIGNED = ("object_com_offset", "encoder_bias", "imu_tilt", "heading_drift", "gyro_bias", "start_yaw")
 """Quantities that may be negative."""
@@ -106,6 +114,8 @@ class Randomization(Section):
                     yield f"{name}.{end}", "should be 0 or more"
                 elif name in POSITIVE and value == 0:
                     yield f"{name}.{end}", "should be positive: no link is without mass"
+        if self.light_share and not self.light_end >= self.object_mass_scale.low > 0.0:
+            yield "light_share", "draws from object_mass_scale.low, which should be positive, to light_end, above it"
 
 
 class Impulses(Section):
@@ -120,6 +130,9 @@ class Impulses(Section):
     duration: float = Field(default=0.1, gt=0.0)
     """Duration of an impulse, a constant force [s]."""
 
+    def problems(self) -> Iterator[tuple[str, str]]:
+        yield from not_negative(self, "interval", "magnitude")
+
 
 class Pushes(Section):
     """Random pushes on the robot's base."""
@@ -132,3 +145,6 @@ class Pushes(Section):
     """Velocity change that a push would give the free robot, in a random horizontal direction [m/s]."""
     duration: float = Field(default=0.1, gt=0.0)
     """Duration of a push, a constant force [s]."""
+
+    def problems(self) -> Iterator[tuple[str, str]]:
+        yield from not_negative(self, "interval", "speed")

@@ -82,6 +82,8 @@ class Object(Section):
             yield "", f"size: {list(self.size)} should be positive"
         if self.shape == "cylinder" and self.size is not None and self.size[0] != self.size[1]:
             yield "", f"size: a cylinder is as long as it is wide, got {self.size[0]:g} and {self.size[1]:g} m"
+        if self.shape == "tyre" and self.size is not None and self.size[1] != self.size[2]:
+            yield "", f"size: a tyre is as wide as it is high, got {self.size[1]:g} and {self.size[2]:g} m"
 
 
 class Scene(Section):

@@ -20,7 +20,7 @@ from iowbc.recipe.section import (
 )
 from iowbc.recipe.simulation.holding import ObjectScene
 from iowbc.recipe.simulation.partner import BEHAVIOURS
-from iowbc.recipe.skill.task import Tasks
+from iowbc.recipe.skill.task import Share, Tasks
 
 LARGEST_ROLLOUT = 1_000_000
 """Largest number of decisions of an update; they are kept in memory."""
@@ -112,7 +112,7 @@ class SkillEvaluation(Section):
     partners: tuple[PartnerKind, ...] = ()
     """Humans: scripted behaviours, and `agent` for the learnt one. Empty: those of training, those held out, and the
     learnt one."""
-    loads: tuple[float, ...] = Field(default=(0.5,), min_length=1)
+    loads: tuple[Share, ...] = Field(default=(0.5,), min_length=1)
     """Masses as fractions of the task's range: 0 is its lower end, 1 its upper end."""
     masses: dict[ObjectScene, Ascending] = Field(default_factory=dict, json_schema_extra=LATER)
     """Masses of a scene's tasks [kg], which replace `loads` and may lie outside the task's range."""

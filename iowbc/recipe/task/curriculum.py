@@ -41,7 +41,8 @@ class Curriculum(Section):
     """
 
     enabled: bool = True
-    """Enable the curriculum; otherwise all environments train at `fixed_level`."""
+    """Enable the curriculum; otherwise no level changes. All environments then train at `fixed_level`, but a training
+    from a trained policy (`teacher.start`, `teacher.history.student`) and a distillation at the levels of that one."""
     fixed_level: float = Field(default=1.0, ge=0.0, le=2.0)
     """Level of all axes without a curriculum, in evaluation and in single environments. 1: the recipe's own ranges."""
     velocity: Scale = Scale(start=1.0, full=1.0, extreme=1.3)

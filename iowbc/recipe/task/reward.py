@@ -201,8 +201,8 @@ class Reward(Section):
             f"{group}.{name}"
             for group, section in groups.items()
             for name, value in section
-            if isinstance(value, float | Kernel)
-        }
+            if isinstance(value, Kernel) or (isinstance(value, float) and not type(section).model_fields[name].metadata)
+        }  # weights have no bounds, unlike parameters of terms
         for unknown in sorted(set(self.later.weights if self.later else ()) - terms):
             yield "", f"later.weights: no term {unknown!r}; valid: {', '.join(sorted(terms))}"
 
