@@ -1,9 +1,11 @@
 """The commands answer fast, say what was meant, and end with the right exit code."""
 
 import json
+import os
 import shlex
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -193,6 +195,13 @@ def test_gc_removes_what_was_used_long_ago_only_when_told_how_long(folder: Path,
     assert command("gc", "--unused", "--older-than", "1").stdout == "0 bytes in all\n"
     assert command("gc", "--unused", "--older-than", "1e-9").returncode == 0
     assert {path.name for path in teachers.iterdir()} == {key("first", "teacher"), key("second", "teacher")}
+
+
+def test_gc_removes_what_is_newer_than_the_clock_says(folder: Path, command: Command) -> None:
+    aside = folder / "runs" / "damaged" / "teacher-1"
+    aside.mkdir(parents=True)
+    os.utime(aside, (time.time() + 3600.0,) * 2)  # the clock was set back since
+    assert "removed runs/damaged/teacher-1" in command("gc", "--damaged").stdout
 
 
 def test_a_long_training_is_removed_by_its_recipes_name_alone(folder: Path, command: Command, key: Key) -> None:
