@@ -119,6 +119,7 @@ def test_diff_names_fields_keys_and_metrics(folder: Path, command: Command, key:
     assert f"teacher: key {key('first', 'teacher')[:12]} -> {key('second', 'teacher')[:12]}" in lines
     assert not any(line.startswith("rg-fit") for line in lines)
     assert "teacher: teacher.steps: 4096 -> 8192" in command("diff", "first/teacher", "second/teacher").stdout
+    assert "(absent)" not in command("diff", "first", "second/teacher").stdout
     assert command("diff", "first", "first").stdout == "no difference\n"
     (folder / "third.yaml").write_text("extends: first.yaml\nseed: 8\n")
     assert "seed: 3 -> 8" in command("diff", "first", "third.yaml").stdout
