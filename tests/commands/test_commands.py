@@ -47,6 +47,7 @@ def test_a_wrong_recipe_fails_at_once(tmp_path: Path) -> None:
         (["run", "first.yaml", "--until", "taecher"], "valid: rg-dataset, rg-fit, teacher"),
         (["run", "first.yaml", "--set", "robot=r2d2"], "no robot 'r2d2'"),
         (["run", "first.yaml", "--workers", "0"], "workers"),
+        (["run", "first.yaml", "--address", "auto"], "add --engine ray"),
         (["run"], "RECIPE"),
         (["fly"], "fly"),
         (["show", "thrid"], "neither a recipe that has run"),
