@@ -59,12 +59,15 @@ def test_a_wrong_recipe_fails_at_once(tmp_path: Path) -> None:
         (["run", "first.yaml", "--runs", "first.yaml"], "first.yaml cannot be written: it is not a folder"),
         (["gc", "--unused", "--runs", "first.yaml"], "give another folder with --runs"),
         (["compare", "first", "second", "--output", "first.yaml"], "give another folder with --output"),
+        (["report", "first", "--output", "folder.html"], "give the name of a file that ends in .html"),
+        (["run", "caf\udce9.yaml"], "'caf\\udce9.yaml' is not utf-8 text"),
         (["ui", "--runs", "first.yaml"], "first.yaml cannot be written"),
         (["run", "first.yaml", "--until", "rg-fit", "--force", "teacher"], "teacher comes after rg-fit"),
         (["bench", "sim", "--runs", "first.yaml"], "first.yaml cannot be written"),
         (["ls", "techer"], "did you mean 'teacher'?"),
         (["gc"], "--unused"),
         (["gc", "--recipe", "frist"], "did you mean 'first'?"),
+        (["gc", "--recipe", "first", "--runs", "empty"], "no such recipe that has run; valid: none"),
         (["play", "first/eval"], "stages that leave one: export, distill, teacher"),
         (["play", "first", "--scene", "lifft"], "did you mean 'lift'?"),
         (["bench", "fly"], "fly"),
@@ -74,6 +77,7 @@ def test_a_wrong_recipe_fails_at_once(tmp_path: Path) -> None:
 def test_wrong_usage_ends_with_2_and_a_reason(folder: Path, command: Command, arguments: list[str], text: str) -> None:
     if "wrong.yaml" in arguments:
         (folder / "wrong.yaml").write_text("teacher:\n  stebs: 3\n")
+    (folder / "folder.html").mkdir()
     done = command(*arguments)
     assert done.returncode == 2
     assert text in done.stderr
