@@ -15,7 +15,7 @@ import typer
 from typer.core import TyperCommand
 from typer.main import get_command
 
-from iowbc.commands.process import described, leave, let_go, prepare_streams
+from iowbc.commands.process import described, leave, let_go, prepare_streams, require_text
 from iowbc.processes import name_glfw
 
 COMMANDS = {
@@ -124,6 +124,7 @@ def main(arguments: list[str] | None = None) -> None:
     prepare_streams()
     code: str | int | None = 1
     try:
+        require_text(arguments or sys.argv[1:])
         try:
             app(arguments, prog_name="iowbc")
         except SystemExit as ended:

@@ -100,7 +100,7 @@ def require_known(name: str, what: str, known: Iterable[str]) -> None:
     """Raises `UsageError` with the known names where `name` is not one of them; `what` is a noun: `scene`, `stage`."""
     valid = list(known)
     if name not in valid:
-        raise UsageError(f"{name}: no such {what}; valid: {', '.join(valid)}{nearest(name, valid)}")
+        raise UsageError(f"{name}: no such {what}; valid: {', '.join(valid) or 'none'}{nearest(name, valid)}")
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

@@ -41,7 +41,7 @@ MAY_IMPORT = {
     "live": WORLD | {"task", "reference", "learning", "deploy", "evaluation", "skill"},
     "benchmarks": WORLD | {"task", "reference", "learning", "deploy"},
     "export": WORLD | {"task", "reference", "learning", "deploy"},
-    "report": {"learning", "pipeline", "recipe", "results", "stages", "errors"},
+    "report": {"learning", "pipeline", "recipe", "results", "stages", "errors", "files"},
     "web": WORLD | {"task", "deploy", "evaluation"},
     "stages": WORLD
     | {"task", "reference", "learning", "rollouts", "deploy", "pipeline", "evaluation", "benchmarks", "export"}

@@ -121,8 +121,8 @@ def report(
     name = name if len(name) <= LONGEST_NAME else f"{Path(words[0]).stem}-and-{len(words) - 1}-others"
     output = output or store.runs.reports / f"{name}.html"
     found = _recipes(store, words, "report")
-    if output.suffix != ".html":
-        raise UsageError(f"--output {output}: a report is an HTML file; give a name that ends in .html")
+    if output.suffix != ".html" or output.is_dir():
+        raise UsageError(f"--output {output}: a report is an HTML file; give the name of a file that ends in .html")
     options.require_extra("train", "iowbc report")
     require_writable(output.parent, "--output")
     require_whole(store.runs, (artifact for run in found for artifact in run.artifacts.values()))

@@ -41,13 +41,14 @@ def diff(
 
 def difference_lines(a: Run, b: Run) -> Iterator[str]:
     """Differences of two recipes or artifacts, one per line, grouped by stage."""
-    yield from _changes("", _today(a.recipe), _today(b.recipe))
+    if recipes := a.recipe and b.recipe:
+        yield from _changes("", _today(a.recipe), _today(b.recipe))
     for stage in dict.fromkeys([*a.artifacts, *b.artifacts]):
         old, new = a.artifacts.get(stage), b.artifacts.get(stage)
         if old is None or new is None:
             yield f"{stage}: only in {b.label if old is None else a.label}"
         else:
-            for text in _of_artifacts(old, new, with_recipe=not (a.recipe and b.recipe)):
+            for text in _of_artifacts(old, new, with_recipe=not recipes):
                 yield f"{stage}: {text}"
 
 
@@ -70,7 +71,7 @@ def _either(store: Store, word: str) -> Run:
 def _today(recipe: Mapping[str, Any]) -> Mapping[str, Any]:
     """A resolved recipe with the defaults of fields that came after it was written; as it is where that fails."""
     try:
-        return recipe and Recipe.model_validate(recipe).model_dump(mode="json")
+        return Recipe.model_validate(recipe).model_dump(mode="json")
     except ValidationError:
         return recipe
 

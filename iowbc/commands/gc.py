@@ -60,7 +60,7 @@ def gc(
         require_writable_runs(store.runs)
     total = 0
     for path in dict.fromkeys(_to_remove(store, unused, recipes or (), work, damaged, older_than)):
-        if time.time() - path.stat().st_mtime < older_than * DAY:
+        if older_than and time.time() - path.stat().st_mtime < older_than * DAY:
             continue
         count = sum(file.stat().st_size for file in (path, *path.rglob("*")) if file.is_file())
         total += count

@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from iowbc.commands import options
-from iowbc.commands.printed import hanging, plain_table, print_json, stdout_console, tell
+from iowbc.commands.printed import hanging, plain_table, print_json, shown_path, stdout_console, tell
 from iowbc.commands.request import Request, in_order, planners, point_planners
 from iowbc.pipeline.console.wording import KEY_LENGTH, duration, short
 from iowbc.pipeline.planner import Planner
@@ -76,7 +76,7 @@ def print_plan(request: Request, console: Console, as_json: bool = False) -> Non
     elif len(found) == 1:
         _print(found[0].plan(), console)
     else:
-        _print_several(planned(found), console)
+        _print_several(request, found, console)
 
 
 def plan_sweep(
@@ -129,18 +129,22 @@ def _identity(planner: Planner, stage: Stage, before: Mapping[str, str]) -> str:
     return data_digest(ingredients)
 
 
-def _print_several(found: Planned, console: Console) -> None:
-    """Print a row for each recipe, a legend, and the total."""
+def _print_several(request: Request, planners: Sequence[Planner], console: Console) -> None:
+    """Print a row for each recipe, a legend, the total, and a command that gives reasons."""
+    found = planned(planners)
     console.print(plan_table(found, "recipe"))
     steps = [stage.step for own in found.values() for stage in own if not stage.shared_with]
     rates = sorted({step.rate_of for step in steps if not step.cached and step.roughly is not None})
     if rates:
         console.print(f"~ at the rate of {', '.join(rates)}, from which it differs", highlight=False)
     console.print(in_all(found, "recipes"), highlight=False, soft_wrap=True)
-    changing = [name for name, own in found.items() if not all(stage.step.cached for stage in own)]
+    rows = zip(found.items(), planners, strict=False)
+    changing = [(name, one.loaded) for (name, own), one in rows if not all(stage.step.cached for stage in own)]
     if changing:
-        others = f"; so for {', '.join(changing[:-1])}" if changing[:-1] else ""
-        tell(console, f"`iowbc plan {changing[-1]}` says why{others}")
+        *others, (_, last) = changing
+        also = f"; so for {', '.join(name for name, _ in others)}" if others else ""
+        alone = Request(shown_path(last.file), last.overrides, request.runs, Options(), "plan")
+        tell(console, f"`{alone.command()}` says why{also}")
 
 
 def in_all(found: Planned, what: str = "points") -> str:

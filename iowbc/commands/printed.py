@@ -25,10 +25,11 @@ PIPE_WIDTH = 160
 
 
 def stdout_console() -> Console:
-    """The console of standard output."""
+    """The console of standard output; a terminal without cursor control counts as none."""
     columns = os.environ.get("COLUMNS", "")
     width = int(columns) if columns.isdecimal() and int(columns) > 0 else PIPE_WIDTH
-    return Console(width=None if sys.stdout.isatty() else width)
+    dumb = os.environ.get("TERM", "") in ("dumb", "unknown")
+    return Console(width=None if sys.stdout.isatty() else width, force_terminal=False if dumb else None)
 
 
 def plain_table(*columns: str) -> Table:

@@ -78,6 +78,18 @@ def prepare_streams() -> None:
             stream.reconfigure(errors="replace")
 
 
+def require_text(words: Sequence[str]) -> None:
+    """Raises `UsageError` for an argument that is no text, such as the name of a file in another encoding: records and
+    printed commands could not repeat it."""
+    for word in words:
+        try:
+            word.encode()
+        except UnicodeEncodeError:
+            from iowbc.errors import UsageError
+
+            raise UsageError(f"{word!r} is not {sys.getfilesystemencoding()} text; rename what it names") from None
+
+
 def let_go() -> None:
     """Discard output that cannot be written any more, before Python tries again at exit."""
     for stream in (sys.stdout, sys.stderr):

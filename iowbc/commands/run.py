@@ -125,6 +125,8 @@ def _report_of(folder: Path) -> str:
 def requested_cluster(asked: Options, execution: Execution) -> "AbstractContextManager[Cluster | None]":
     """Context manager of the requested cluster; it yields None if stages run here. Raises `UsageError`."""
     if (asked.engine or execution.engine) == "local":
+        if asked.address:
+            raise UsageError(f"--address {asked.address} is that of a Ray cluster; add --engine ray")
         return nullcontext()
     options.require_extra("cluster", "--engine ray")
     from iowbc.pipeline.cluster.connection import connected

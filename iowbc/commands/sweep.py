@@ -12,7 +12,7 @@ import typer
 from rich.console import Console
 
 from iowbc.commands import completion, options
-from iowbc.commands.lookup import named, record_sweep
+from iowbc.commands.lookup import SWEEP_FIGURE, SWEEP_TABLE, named, record_sweep
 from iowbc.commands.plan import in_all, plan_sweep, planned
 from iowbc.commands.points import Endings, PointProcess, PointRun, PointThread, run_points
 from iowbc.commands.printed import shown_path, stdout_console, tell
@@ -105,7 +105,6 @@ def run_sweep(
     options.require_extra("train", "iowbc sweep")
     require_writable_runs(runs)
     folder = runs.sweeps / found.name
-    record_sweep(found, folder)
     before, said = planned(planners), Console(quiet=True) if quiet else console
     said.print(f"{found.name}: {in_all(before)}", highlight=False, soft_wrap=True)
     endings: Endings = dict.fromkeys(before, RunEnding(INTERRUPTED))
@@ -117,6 +116,7 @@ def run_sweep(
         ):
             if cluster is not None:
                 said.print(cluster.text, highlight=False)
+            record_sweep(found, folder)
             jobs, workers = _shared_out(planners, jobs, cluster)
             if execution.track and not all(stage.step.cached for own in before.values() for stage in own):
                 record = sweep_record(runs, found, execution)
@@ -165,7 +165,7 @@ def _conclude(
     found: Sweep, endings: Endings, runs: Runs, folder: Path, console: Console, record: RunRecord | None
 ) -> None:
     """Write the results of the points that have finished, print them, and record them."""
-    from iowbc.commands.sweep_results import FIGURE, TABLE, outcomes, table, write_results
+    from iowbc.commands.sweep_results import outcomes, table, write_results
 
     states = {name: ending.state for name, ending in endings.items()}
     finished = {name: named(Store(runs), name) for name, state in states.items() if state == "done"}
@@ -177,7 +177,7 @@ def _conclude(
     if record is not None:
         means = {f"{line.label}/{name}": mean for line in lines for name, mean in line.means.items()}
         figures = {name: mean for name, mean in means.items() if math.isfinite(mean)}
-        record.describe(markdown(results), figures, [folder / FIGURE, folder / TABLE])
+        record.describe(markdown(results), figures, [folder / SWEEP_FIGURE, folder / SWEEP_TABLE])
     console.print(drawn(results, console.width))
     for path in paths:
         tell(console, shown_path(path))

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from iowbc.commands.lookup import SWEEP_FIGURE, SWEEP_POINTS, SWEEP_TABLE
 from iowbc.commands.results import headline
 from iowbc.evaluation.report.statistics import mean_half_width
 from iowbc.recipe.recipe import PIPELINE, SEEDS
@@ -18,12 +19,13 @@ from iowbc.results.table import Table, heads, markdown, measured
 
 OUTCOMES_SHOWN = 6
 """Maximum number of metrics in the table and the figure; those of the last stages come first."""
-TABLE, FIGURE, POINTS = "table.md", "parallel.png", "points.csv"
 
 
 def outcomes(sweep: Sweep, found: Mapping[str, Run]) -> list[Line]:
     """A line for each setting, seeds together; `found`: the finished points by name, at least one."""
     settings = [path for path in sweep.axes if path not in SEEDS]
+    last_words = [path.rpartition(".")[2] for path in settings]
+    names = [word if last_words.count(word) == 1 else path for word, path in zip(last_words, settings, strict=True)]
     points = [point for point in sweep.points if point.name in found]
     metrics = _chosen([found[point.name] for point in points])
     groups: dict[tuple[str, ...], list[Point]] = {}
@@ -31,7 +33,8 @@ def outcomes(sweep: Sweep, found: Mapping[str, Run]) -> list[Line]:
         groups.setdefault(tuple(written(point.settings[path]) for path in settings), []).append(point)
     lines = []
     for group in groups.values():
-        own, runs = {path: group[0].settings[path] for path in settings}, [found[point.name] for point in group]
+        own = {name: group[0].settings[path] for name, path in zip(names, settings, strict=True)}
+        runs = [found[point.name] for point in group]
         means, halves = dict.fromkeys(metrics, math.nan), dict.fromkeys(metrics, math.nan)
         for name in metrics:
             # Points that share an artifact count as one measurement.
@@ -41,7 +44,7 @@ def outcomes(sweep: Sweep, found: Mapping[str, Run]) -> list[Line]:
             if len(values):
                 alike = len(values) > 1 and not np.ptp(values)
                 means[name], halves[name] = float(values.mean()), 0.0 if alike else mean_half_width(values)
-        label = ", ".join(f"{path.rpartition('.')[2]} {written(value)}" for path, value in own.items()) or sweep.name
+        label = ", ".join(f"{name} {written(value)}" for name, value in own.items()) or sweep.name
         lines.append(Line(label, own, means, halves, [{name: _metric(run, name) for name in metrics} for run in runs]))
     return lines
 
@@ -73,7 +76,7 @@ def write_results(
     sweep: Sweep, lines: Sequence[Line], found: Mapping[str, Run], states: Mapping[str, str], folder: Path
 ) -> list[Path]:
     """Write table, figure and points; returns their paths."""
-    paths = [folder / name for name in (TABLE, FIGURE, POINTS)]
+    paths = [folder / name for name in (SWEEP_TABLE, SWEEP_FIGURE, SWEEP_POINTS)]
     paths[0].write_text(markdown(table(sweep, lines)), encoding="utf-8")
     title = f"{sweep.name}: means over seeds (thick), 95 % intervals (bars), single runs (thin)"
     write_figure(parallel_coordinates(lines, title), paths[1])
@@ -89,7 +92,6 @@ def write_results(
 
 def table(sweep: Sweep, lines: Sequence[Line]) -> Table:
     """A row for each setting: means over seeds with half their 95 % interval."""
-    settings = [path.rpartition(".")[2] for path in lines[0].settings]
     rows = [
         (
             *map(written, line.settings.values()),
@@ -99,4 +101,4 @@ def table(sweep: Sweep, lines: Sequence[Line]) -> Table:
         for line in lines
     ]
     caption = f"Sweep {sweep.name}: means over seeds with their 95 % interval."
-    return Table(sweep.name, caption, heads(*settings, "seeds", *lines[0].means), rows, grouped=False)
+    return Table(sweep.name, caption, heads(*lines[0].settings, "seeds", *lines[0].means), rows, grouped=False)

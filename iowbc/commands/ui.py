@@ -5,7 +5,7 @@ import os
 import signal
 import subprocess
 import sys
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -17,6 +17,9 @@ from iowbc.pipeline.tracking.delivery import URI_VARIABLE, embedded_uri, open_ex
 from iowbc.pipeline.tracking.tracker import backlog, start_sender
 from iowbc.recipe.execution import Execution
 from iowbc.stages.registry import STAGES
+
+if TYPE_CHECKING:
+    from mlflow.tracking import MlflowClient
 
 VIEW = "iowbc"
 """Name of the shared view in MLflow."""
@@ -38,7 +41,7 @@ def ui(
     options.require_free(port)
     signal.signal(signal.SIGTERM, signal.getsignal(signal.SIGINT))
     uri = embedded_uri(runs)
-    mlflow, shown = open_experiment(runs, uri, Execution.model_fields["experiment"].default)
+    mlflow, shown = opened(runs, uri)
     mlflow.set_experiment_tag(shown, f"mlflow.sharedViewState.{VIEW}", json.dumps(view()))
     if backlog(runs):
         start_sender(runs)
@@ -54,6 +57,20 @@ def ui(
             raise typer.Exit(server.wait())
         finally:
             server.terminate()
+
+
+def opened(runs: Runs, uri: str) -> "tuple[MlflowClient, str]":
+    """MLflow's client and the experiment shown. Raises `UsageError` where the database cannot be read."""
+    from mlflow.exceptions import MlflowException
+    from sqlalchemy.exc import SQLAlchemyError
+
+    try:
+        return open_experiment(runs, uri, Execution.model_fields["experiment"].default)
+    except (MlflowException, SQLAlchemyError) as error:
+        raise UsageError(
+            f"MLflow cannot use {runs.database}: {str(error).splitlines()[0]}; if it is damaged, move it away: the "
+            "next run begins another, and artifacts do not depend on it"
+        ) from None
 
 
 def view() -> dict[str, object]:

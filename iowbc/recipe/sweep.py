@@ -225,6 +225,8 @@ def _require_axes(axes: Sequence[str], file: Path | None) -> None:
         text = "a sweep varies something: `--set seed=0..4`, `--set task.references.use_rg=true,false`, or --from FILE"
         raise RecipeError([Problem(place, text)])
     for path in axes:
+        if part := next((other for other in axes if path.startswith(f"{other}.")), ""):
+            raise RecipeError([Problem(f"{place} {path}", f"is a part of {part}, which is varied, too; vary one")])
         if path in ("name", "description") or path.split(".")[0] in ("execution", "extends"):
             raise RecipeError([Problem(f"{place} {path}", "is not varied: it decides no result")])
 

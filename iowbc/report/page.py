@@ -9,6 +9,7 @@ from importlib.resources import files
 from pathlib import Path
 from types import MappingProxyType
 
+from iowbc.files import write_whole
 from iowbc.learning.curves import FIGURE
 from iowbc.pipeline.console.wording import KEY_LENGTH, duration
 from iowbc.pipeline.store.artifact import INGREDIENTS, RECIPE, Artifact
@@ -63,7 +64,7 @@ def write_page(
         plotly=get_plotlyjs().replace("</script", "<\\/script"),
         nonce=secrets.token_urlsafe(),
     )
-    path.write_text(text, encoding="utf-8")
+    write_whole(path, text)
 
 
 def _media(runs: Sequence[Run], folder: str, together: Mapping[str, bytes], kind: str) -> list[tuple[str, str, str]]:

@@ -32,6 +32,7 @@ class Line:
 
     label: str
     settings: Mapping[str, JsonValue]
+    """By the last word of their paths, or the whole path where two end alike."""
     means: Mapping[str, float]
     """Mean of each outcome; all lines have the same. NaN where there is none, as in the two below."""
     halves: Mapping[str, float]
@@ -86,15 +87,13 @@ def parallel_coordinates(lines: Sequence[Line], title: str) -> Figure:
 
 def _setting(name: str, lines: Sequence[Line]) -> AxisScale:
     """The axis of a setting: numbers to scale, other values at equal distances."""
-    short, values = name.rpartition(".")[2], [line.settings[name] for line in lines]
+    values = [line.settings[name] for line in lines]
     numbers = [float(value) for value in values if isinstance(value, (int, float)) and not isinstance(value, bool)]
     if len(numbers) == len(values):
-        return _numbers(short, numbers, named=True)
+        return _numbers(name, numbers, named=True)
     texts = list(dict.fromkeys(map(written, values)))
     places = dict(zip(texts, np.linspace(0.0, 1.0, len(texts)) if len(texts) > 1 else [0.5], strict=True))
-    return AxisScale(
-        short, lambda value: places.get(written(value), math.nan), [(places[text], text) for text in texts]
-    )
+    return AxisScale(name, lambda value: places.get(written(value), math.nan), [(places[text], text) for text in texts])
 
 
 def _outcome(name: str, lines: Sequence[Line]) -> AxisScale:

@@ -108,7 +108,8 @@ def measured(
 def markdown(table: Table) -> str:
     """GitHub Markdown with the caption above."""
     caption = [f"*{table.caption}*", ""] if table.caption else []
-    rows = [table.head, ["---"] * len(table.head), *table.texts()]
+    texts = [[cell.replace("|", r"\|") for cell in row] for row in (table.head, *table.texts())]
+    rows = [texts[0], ["---"] * len(table.head), *texts[1:]]
     return "\n".join([*caption, *(f"| {' | '.join(row)} |" for row in rows)]) + "\n"
 
 

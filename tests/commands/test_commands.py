@@ -1,9 +1,11 @@
 """The commands answer fast, say what was meant, and end with the right exit code."""
 
 import json
+import os
 import shlex
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -45,6 +47,7 @@ def test_a_wrong_recipe_fails_at_once(tmp_path: Path) -> None:
         (["run", "first.yaml", "--until", "taecher"], "valid: rg-dataset, rg-fit, teacher"),
         (["run", "first.yaml", "--set", "robot=r2d2"], "no robot 'r2d2'"),
         (["run", "first.yaml", "--workers", "0"], "workers"),
+        (["run", "first.yaml", "--address", "auto"], "add --engine ray"),
         (["run"], "RECIPE"),
         (["fly"], "fly"),
         (["show", "thrid"], "neither a recipe that has run"),
@@ -56,12 +59,15 @@ def test_a_wrong_recipe_fails_at_once(tmp_path: Path) -> None:
         (["run", "first.yaml", "--runs", "first.yaml"], "first.yaml cannot be written: it is not a folder"),
         (["gc", "--unused", "--runs", "first.yaml"], "give another folder with --runs"),
         (["compare", "first", "second", "--output", "first.yaml"], "give another folder with --output"),
+        (["report", "first", "--output", "folder.html"], "give the name of a file that ends in .html"),
+        (["run", "caf\udce9.yaml"], "'caf\\udce9.yaml' is not utf-8 text"),
         (["ui", "--runs", "first.yaml"], "first.yaml cannot be written"),
         (["run", "first.yaml", "--until", "rg-fit", "--force", "teacher"], "teacher comes after rg-fit"),
         (["bench", "sim", "--runs", "first.yaml"], "first.yaml cannot be written"),
         (["ls", "techer"], "did you mean 'teacher'?"),
         (["gc"], "--unused"),
         (["gc", "--recipe", "frist"], "did you mean 'first'?"),
+        (["gc", "--recipe", "first", "--runs", "empty"], "no such recipe that has run; valid: none"),
         (["play", "first/eval"], "stages that leave one: export, distill, teacher"),
         (["play", "first", "--scene", "lifft"], "did you mean 'lift'?"),
         (["bench", "fly"], "fly"),
@@ -71,6 +77,7 @@ def test_a_wrong_recipe_fails_at_once(tmp_path: Path) -> None:
 def test_wrong_usage_ends_with_2_and_a_reason(folder: Path, command: Command, arguments: list[str], text: str) -> None:
     if "wrong.yaml" in arguments:
         (folder / "wrong.yaml").write_text("teacher:\n  stebs: 3\n")
+    (folder / "folder.html").mkdir()
     done = command(*arguments)
     assert done.returncode == 2
     assert text in done.stderr
@@ -117,6 +124,7 @@ def test_diff_names_fields_keys_and_metrics(folder: Path, command: Command, key:
     assert f"teacher: key {key('first', 'teacher')[:12]} -> {key('second', 'teacher')[:12]}" in lines
     assert not any(line.startswith("rg-fit") for line in lines)
     assert "teacher: teacher.steps: 4096 -> 8192" in command("diff", "first/teacher", "second/teacher").stdout
+    assert "(absent)" not in command("diff", "first", "second/teacher").stdout
     assert command("diff", "first", "first").stdout == "no difference\n"
     (folder / "third.yaml").write_text("extends: first.yaml\nseed: 8\n")
     assert "seed: 3 -> 8" in command("diff", "first", "third.yaml").stdout
@@ -193,6 +201,13 @@ def test_gc_removes_what_was_used_long_ago_only_when_told_how_long(folder: Path,
     assert command("gc", "--unused", "--older-than", "1").stdout == "0 bytes in all\n"
     assert command("gc", "--unused", "--older-than", "1e-9").returncode == 0
     assert {path.name for path in teachers.iterdir()} == {key("first", "teacher"), key("second", "teacher")}
+
+
+def test_gc_removes_what_is_newer_than_the_clock_says(folder: Path, command: Command) -> None:
+    aside = folder / "runs" / "damaged" / "teacher-1"
+    aside.mkdir(parents=True)
+    os.utime(aside, (time.time() + 3600.0,) * 2)  # the clock was set back since
+    assert "removed runs/damaged/teacher-1" in command("gc", "--damaged").stdout
 
 
 def test_a_long_training_is_removed_by_its_recipes_name_alone(folder: Path, command: Command, key: Key) -> None:

@@ -60,6 +60,12 @@ def test_a_recipe_that_is_named_like_a_part_of_runs_has_no_links(folder: Path, c
     assert not any(path.is_symlink() for path in (folder / "runs" / "store").iterdir())
 
 
+def test_a_recipe_runs_although_a_link_stands_where_its_links_would(folder: Path, command: Command) -> None:
+    shutil.rmtree(folder / "runs" / "first")
+    (folder / "runs" / "first").symlink_to("nowhere")
+    assert command("run", "first.yaml").returncode == 0
+
+
 def test_what_is_published_goes_by_its_recipes_name_before_anything_ran(
     folder: Path, command: Command, monkeypatch: pytest.MonkeyPatch
 ) -> None:

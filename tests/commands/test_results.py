@@ -16,7 +16,7 @@ from iowbc.commands.lookup import last_used
 from iowbc.commands.results import headline, next_commands, print_results
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
-from iowbc.results.table import Column, MeanCell, Table, drawn, heads, read_tables, write_table
+from iowbc.results.table import Column, MeanCell, Table, drawn, heads, markdown, read_tables, write_table
 
 PUBLISHED = Path(__file__).parents[2] / "runs" / "published"
 LIFTING = Table(
@@ -52,6 +52,11 @@ def test_a_table_that_was_stored_is_drawn_as_it_was_made(tmp_path: Path) -> None
     assert text.splitlines()[0] == "Command tracking errors under lifting"
     assert "0.039 ± 0.024" in text
     assert text.count("0 kg") == 1, "the first column groups rows that repeat it"
+
+
+def test_a_bar_in_a_cell_does_not_end_it_in_markdown() -> None:
+    table = Table("one", "", heads("Algorithm"), [("with | without",)])
+    assert markdown(table).splitlines()[2] == r"| with \| without |"
 
 
 @pytest.mark.parametrize(

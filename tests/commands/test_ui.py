@@ -16,9 +16,10 @@ from typing import Any
 import pytest
 from network_watch import watched
 
-from iowbc.commands.ui import ui, view
+from iowbc.commands.ui import opened, ui, view
 from iowbc.errors import UsageError
 from iowbc.pipeline.store.runs import Runs
+from iowbc.pipeline.tracking.delivery import embedded_uri
 from iowbc.pipeline.tracking.journal import Journal
 from iowbc.pipeline.tracking.tracker import DESCRIPTION
 from iowbc.stages.registry import STAGES
@@ -63,6 +64,14 @@ def recorded(runs: Runs, environment: Mapping[str, str]) -> None:
         journal.write("end", id="recipe", status="FINISHED")
     words = [sys.executable, "-m", "iowbc.pipeline.tracking.delivery", str(runs.root)]
     assert subprocess.run(words, env=environment, check=False, timeout=120).returncode == 0
+
+
+@pytest.mark.filterwarnings("ignore")  # of MLflow's own code
+def test_a_damaged_database_is_named_with_a_remedy(tmp_path: Path) -> None:
+    runs = Runs(tmp_path)
+    runs.database.write_bytes(b"not a database" * 100)
+    with pytest.raises(UsageError, match=r"mlflow\.db: .*file is not a database; if it is damaged, move it away"):
+        opened(runs, embedded_uri(runs))
 
 
 def test_the_columns_are_metrics_that_stages_leave() -> None:

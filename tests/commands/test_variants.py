@@ -32,7 +32,7 @@ def test_each_variant_runs_once_and_they_are_compared(folder: Path, command: Com
     assert rows[2][5].replace(".", "").isdigit(), "eval has more trials: its rate is known"
     assert rows[2][7].startswith("~"), "export has another name: its time is like that of the other"
     assert "2 recipes: 2 stages would run, 0 are shared, 10 cached; a guess: " in planned
-    assert "`iowbc plan third` says why" in planned
+    assert "`iowbc plan third.yaml` says why" in planned
     done = command("run", "both.yaml")
     assert done.returncode == 0, done.stderr
     assert done.stdout.count(": runs - ") == 2
@@ -41,6 +41,8 @@ def test_each_variant_runs_once_and_they_are_compared(folder: Path, command: Com
     assert len(compared) == 2, "the made-up stages count alike, and what is alike is left out"
     assert command("run", "both.yaml").stdout.count(": cached") == 12
     assert "next:\n  iowbc report both" in done.stdout
+    planned = command("plan", "both.yaml", "--set", "eval.trials=9").stdout
+    assert planned.endswith("`iowbc plan third.yaml --set eval.trials=9` says why; so for first\n")
     changed = command("run", "both.yaml", "--set", "eval.trials=9")
     assert changed.returncode == 0, changed.stderr
     assert "iowbc report both" not in changed.stdout, "the names stand for the runs without overrides"

@@ -19,12 +19,12 @@ CTRL_C = b"\x03"
 class Terminal:
     """A run in a terminal of so many columns, and its screen."""
 
-    def __init__(self, folder: Path, columns: int) -> None:
+    def __init__(self, folder: Path, columns: int, kind: str = "xterm-256color") -> None:
         self.ours, theirs = os.openpty()
         fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 50, columns, 0, 0))
         words = ["setsid", "--ctty", sys.executable, str(COMMAND), "run", "small.yaml"]
         settings = {name: value for name, value in os.environ.items() if name not in ("COLUMNS", "LINES", "NO_COLOR")}
-        settings |= {"FAKE_BEHAVIOUR": json.dumps(SLOW), "TERM": "xterm-256color"}
+        settings |= {"FAKE_BEHAVIOUR": json.dumps(SLOW), "TERM": kind}
         self.process = subprocess.Popen(words, cwd=folder, env=settings, stdin=theirs, stdout=theirs, stderr=theirs)
         os.close(theirs)
         os.set_blocking(self.ours, False)
@@ -61,3 +61,13 @@ def test_ctrl_c_in_a_terminal_leaves_one_table_and_how_to_go_on(workplace: Workp
     assert row.split()[1] == "stopped"
     assert "^C" not in "\n".join(line for line in shown if line.split()[0] in ("stage", "teacher"))
     assert shown[-1].startswith("iowbc run small.yaml")
+
+
+def test_a_terminal_without_cursor_control_shows_progress_in_lines(workplace: Workplace) -> None:
+    terminal = Terminal(workplace.folder, 80, "dumb")
+    try:
+        until(lambda: any("%" in line for line in terminal.lines()))
+        assert terminal.process.poll() is None
+    finally:
+        terminal.process.kill()
+        terminal.process.wait()

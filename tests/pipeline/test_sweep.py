@@ -53,6 +53,14 @@ def test_what_points_share_is_one_measurement_without_an_interval(workplace: Wor
     assert table[4] == "| 4096 | 2 | 3 |"
 
 
+def test_two_settings_whose_paths_end_alike_are_told_apart(workplace: Workplace) -> None:
+    grid = ("--set", "teacher.steps=4096,8192", "--set", "distill.steps=2048,4096")
+    done = workplace.command("sweep", "small.yaml", *grid, "--until", "rg-dataset")
+    assert done.code == 0, done.errors
+    table = (workplace.folder / "runs" / "sweeps" / "small-steps-steps" / "table.md").read_text().splitlines()
+    assert table[2] == "| teacher.steps | distill.steps | seeds | rg-dataset count |"
+
+
 def test_a_point_that_fails_does_not_stop_the_others(workplace: Workplace) -> None:
     behaviour = {"teacher": {"fail": "it got lost", "seed": 1}}
     done = workplace.command("sweep", "small.yaml", "--set", "seed=0..2", behaviour=behaviour)
@@ -61,6 +69,15 @@ def test_a_point_that_fails_does_not_stop_the_others(workplace: Workplace) -> No
     assert "1 of 3 points failed:\n  small-seed-1: teacher failed: it got lost" in done.errors
     assert done.errors.strip().splitlines()[-1] == "iowbc sweep small.yaml --set seed=0..2"
     assert counts(workplace)["export"] == 2
+
+
+def test_results_of_other_points_do_not_remain_in_the_folder_of_a_sweep(workplace: Workplace) -> None:
+    table = workplace.folder / "runs" / "sweeps" / "small-seed" / "table.md"
+    assert workplace.command("sweep", "small.yaml", "--set", "seed=0..1", "--until", "rg-dataset").code == 0
+    failing = {"rg-dataset": {"fail": "it got lost"}}
+    assert table.exists()
+    assert workplace.command("sweep", "small.yaml", "--set", "seed=2..3", behaviour=failing).code == 1
+    assert not table.exists()
 
 
 def test_a_kill_and_ctrl_c_lose_nothing_and_the_last_line_goes_on(workplace: Workplace) -> None:

@@ -9,9 +9,11 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import pytest
 from workplace import RECIPE, SLOW, Workplace, until
 
 from iowbc.pipeline.store.runs import Runs
+from iowbc.pipeline.tracking.delivery import embedded_uri, open_experiment
 from iowbc.pipeline.tracking.journal import Journal, close_orphaned, statuses, unsent
 from iowbc.pipeline.tracking.tracker import backlog
 
@@ -109,6 +111,15 @@ def test_two_first_runs_at_once_share_a_fresh_database(workplace: Workplace) -> 
     assert [(status, set(stages.values()), len(stages)) for status, stages in found] == [
         ("FINISHED", {"FINISHED"}, 6)
     ] * 2
+
+
+@pytest.mark.filterwarnings("ignore")  # of MLflow's own code
+def test_an_experiment_that_was_deleted_takes_runs_again(tmp_path: Path) -> None:
+    runs = Runs(tmp_path)
+    client, experiment = open_experiment(runs, embedded_uri(runs), "tried")
+    client.delete_experiment(experiment)
+    client, again = open_experiment(runs, embedded_uri(runs), "tried")
+    assert client.create_run(again).info.experiment_id == experiment
 
 
 def test_a_server_that_is_away_stops_nothing_and_hears_everything_later(workplace: Workplace) -> None:

@@ -27,6 +27,13 @@ def test_a_file_above_it_or_in_place_of_a_part_is_refused(tmp_path: Path) -> Non
             require_writable_runs(Runs(root))
 
 
+def test_a_link_that_leads_nowhere_is_named_with_its_target(tmp_path: Path) -> None:
+    (tmp_path / "work").symlink_to("/disk/that/is/not/mounted")
+    for root in (tmp_path, tmp_path / "work"):
+        with pytest.raises(UsageError, match="leads to /disk/that/is/not/mounted, where no folder is"):
+            require_writable_runs(Runs(root))
+
+
 def test_a_folder_where_the_system_lets_nobody_write_is_refused() -> None:
     with pytest.raises(UsageError, match="/proc/v1 cannot be written: "):
         require_writable_runs(Runs(Path("/proc/v1")))

@@ -124,6 +124,11 @@ def test_a_number_where_text_belongs_is_asked_for_in_quotes(tmp_path: Path) -> N
     assert loaded(tmp_path, "seed: 1\n", 'name="1e3"').recipe.name == "1e3"
 
 
+def test_a_name_that_is_none_is_told_what_it_may_hold(tmp_path: Path) -> None:
+    (text,) = problems(tmp_path, "name: Größe\n")
+    assert "key 'name' = 'Größe': should be lower-case letters, digits, `-` and `_`" in text
+
+
 def test_a_misspelt_key_names_place_value_valid_keys_and_the_nearest(tmp_path: Path) -> None:
     (text,) = problems(tmp_path, "seed: 1\nteacher:\n  leaning_rate: 0.1\n")
     assert text.startswith("mine.yaml:3:3: key 'teacher.leaning_rate' = 0.1: is not a key of 'teacher'; valid: ")

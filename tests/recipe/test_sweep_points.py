@@ -117,6 +117,7 @@ def test_the_variants_of_a_recipe_of_recipes_are_an_axis(recipe: str, tmp_path: 
         (["execution.workers=1,2"], "decides no result"),
         (["seed=0..200", "eval.trials=1..200"], "40,200 points"),
         (["seed=0,x"], "key 'seed' = 'x'"),
+        (["teacher={clip: 0.3},{clip: 0.4}", "teacher.clip=0.1,0.2"], "teacher.clip: is a part of teacher"),
         (["sede=0,1"], "did you mean 'seed'"),
     ],
 )

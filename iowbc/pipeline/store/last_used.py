@@ -141,7 +141,7 @@ def remove_dangling(runs: Runs) -> None:
 def _link(runs: Runs, recipe: str, name: str, artifact: Path) -> None:
     """Let `runs/<recipe>/<name>` lead to an artifact's folder; a recipe named like a part of `runs` has no links."""
     folder = runs.root / recipe
-    if folder in runs.parts or (folder.exists() and not _only_links(folder)):
+    if folder in runs.parts or (os.path.lexists(folder) and not _only_links(folder)):
         return
     folder.mkdir(exist_ok=True)
     fresh = folder / f".{name}.{os.getpid()}"

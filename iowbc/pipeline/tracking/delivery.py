@@ -192,13 +192,16 @@ def tracking_uri() -> str:
 
 
 def open_experiment(runs: Runs, uri: str, name: str) -> "tuple[MlflowClient, str]":
-    """A client of a tracking store or server, and the identifier of an experiment there, created if missing; files of
-    an SQLite store lie under `runs/`. One process at a time: MLflow does not protect the set-up of a database."""
+    """A client of a tracking store or server, and the identifier of an experiment there, created if missing and
+    restored if deleted; files of an SQLite store lie under `runs/`. One process at a time: MLflow does not protect the
+    set-up of a database."""
     from mlflow.tracking import MlflowClient
 
     with named_lock(runs.tracking / "setup.lock"):
         client = MlflowClient(tracking_uri=uri)
         if (found := client.get_experiment_by_name(name)) is not None:
+            if found.lifecycle_stage == "deleted":  # it takes no runs, and its name remains taken
+                client.restore_experiment(found.experiment_id)
             return client, str(found.experiment_id)
         location = runs.tracked_files.absolute().as_uri() if uri.startswith("sqlite:") else None
         if uri == embedded_uri(runs):

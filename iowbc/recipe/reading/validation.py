@@ -132,6 +132,8 @@ def _problem(tree: Located, error: ErrorDetails) -> tuple[str, str, str]:
         text = text.split(",")[0]
     if found.place.startswith("--set ") and isinstance(found.value, str) and SEVERAL.search(found.value):
         text += "; several values are for `iowbc sweep`"
+    if error["type"] == "string_pattern_mismatch" and path == ("name",):
+        text = "should be lower-case letters, digits, `-` and `_`; give it as `name:` where the file is named otherwise"
     if error["type"] == "string_type" and isinstance(found.value, (int, float)):
         text = "should be text; in quotes, a word that reads as a number is"
     if error["type"] in ("literal_error", "enum") and isinstance(found.value, str):
