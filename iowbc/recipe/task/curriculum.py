@@ -41,8 +41,11 @@ class Curriculum(Section):
     """
 
     enabled: bool = True
-    """Enable the curriculum; otherwise no level changes. All environments then train at `fixed_level`, but a training
-    from a trained policy (`teacher.start`, `teacher.history.student`) and a distillation at the levels of that one."""
+    """Enable the curriculum; otherwise no level changes."""
+    inherit: bool = Field(default=True, json_schema_extra=LATER)
+    """A training from a trained policy (`teacher.start`, `teacher.history.student`) and a distillation begin at the
+    levels of that one, which without a curriculum stay; otherwise, as a training from random weights does, at 0, or
+    without a curriculum at `fixed_level`."""
     fixed_level: float = Field(default=1.0, ge=0.0, le=2.0)
     """Level of all axes without a curriculum, in evaluation and in single environments. 1: the recipe's own ranges."""
     velocity: Scale = Scale(start=1.0, full=1.0, extreme=1.3)

@@ -160,7 +160,10 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
         }
 
     def set_curriculum(self, curriculum: Mapping[str, Any]) -> None:
-        """Spreads the levels of another vector environment's `curriculum` over the environments of each scene."""
+        """Spreads the levels of another vector environment's `curriculum` over the environments of each scene, unless
+        the recipe does not inherit them."""
+        if not self.setup.specification.recipe.task.curriculum.inherit:
+            return
         known: Mapping[str, Mapping[str, Sequence[float]]] = curriculum["levels"]
         every = {axis: [level for levels in known.values() for level in levels[axis]] for axis in AXES}
         scenes, levels = np.array(self._scenes), np.empty((self.num_envs, len(AXES)))
