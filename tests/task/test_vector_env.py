@@ -202,6 +202,9 @@ def test_levels_carry_over_to_another_number_of_environments(make: Make) -> None
         levels = [level[axis] for level in target.get_attr("level")]
         assert np.mean(levels[:3]) == pytest.approx(0.25)
         assert np.mean(levels[3:]) == pytest.approx(1.5)
+    own = make(num_envs=6, changes={"task.curriculum.enabled": False, "task.curriculum.inherit": False})
+    own.set_curriculum(source.curriculum())
+    assert own.get_attr("level") == [dict.fromkeys(AXES, 1.0)] * 6
 
 
 def test_scenes_are_played_in_the_recipes_shares(make: Make) -> None:
