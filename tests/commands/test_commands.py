@@ -56,7 +56,7 @@ def test_a_wrong_recipe_fails_at_once(tmp_path: Path) -> None:
         (["compare", "first"], "two or more"),
         (["compare", "first", "first"], "two or more"),
         (["compare", "first/eval", "second/eval"], "first/eval is one artifact; compare takes recipes"),
-        (["run", "first.yaml", "--runs", "first.yaml"], "first.yaml cannot be written: it is not a folder"),
+        (["run", "first.yaml", "--runs", "first.yaml"], "first.yaml is not a folder"),
         (["gc", "--unused", "--runs", "first.yaml"], "give another folder with --runs"),
         (["compare", "first", "second", "--output", "first.yaml"], "give another folder with --output"),
         (["report", "first", "--output", "folder.html"], "give the name of a file that ends in .html"),

@@ -16,7 +16,7 @@ def test_a_missing_folder_is_made_and_nothing_is_left_in_it(tmp_path: Path) -> N
 
 def test_a_file_in_its_place_is_refused(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    with pytest.raises(UsageError, match="file cannot be written: it is not a folder; give another folder with --runs"):
+    with pytest.raises(UsageError, match="file cannot be written: .*file is not a folder; give another folder with --runs"):
         require_writable_runs(Runs(tmp_path / "file"))
 
 
@@ -30,7 +30,7 @@ def test_a_file_above_it_or_in_place_of_a_part_is_refused(tmp_path: Path) -> Non
 def test_a_link_that_leads_nowhere_is_named_with_its_target(tmp_path: Path) -> None:
     (tmp_path / "work").symlink_to("/disk/that/is/not/mounted")
     for root in (tmp_path, tmp_path / "work"):
-        with pytest.raises(UsageError, match="leads to /disk/that/is/not/mounted, where no folder is"):
+        with pytest.raises(UsageError, match="/disk/that/is/not/mounted is not a folder"):
             require_writable_runs(Runs(root))
 
 

@@ -89,26 +89,19 @@ def require_writable(folder: Path, option: str, closed: str = "") -> None:
 
 def obstacle(folder: Path) -> str:
     """The reason why files cannot be created in a folder, empty if they can; creates the folder if it is missing."""
-    if reason := _no_folder(folder):
-        return reason
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.NamedTemporaryFile(dir=folder, prefix=".writable-"):
             return ""
+    except FileExistsError:
+        return f"{folder.resolve()} is not a folder"
     except OSError as error:
         return error.strerror or str(error)
 
 
-def _no_folder(path: Path) -> str:
-    """The reason why no folder is at a path; empty where one is, or nothing."""
-    if path.is_dir() or not os.path.lexists(path):
-        return ""
-    return f"it leads to {path.readlink()}, where no folder is" if path.is_symlink() else "it is not a folder"
-
-
 def _closed(part: Path) -> str:
     """The reason why an existing part of the runs is closed to this user; empty where it is open or not there."""
-    if reason := _no_folder(part):
-        return f"{part}: {reason}"
+    if os.path.lexists(part) and not part.is_dir():
+        return f"{part.resolve()} is not a folder"
     open_ = not part.exists() or os.access(part, os.R_OK | os.W_OK | os.X_OK)
     return "" if open_ else f"{part} belongs to another user or is read-only"
