@@ -10,8 +10,8 @@ from iowbc.recipe.section import Ascending, Distinct, Masses, Section
 from iowbc.recipe.simulation.holding import Held, ObjectScene
 from iowbc.recipe.simulation.partner import BEHAVIOURS
 
-Share = Annotated[float, Field(ge=-1, le=1)]
-PartnerShare = Share | None
+SignedShare = Annotated[float, Field(ge=-1, le=1)]
+PartnerShare = SignedShare | None
 
 
 class SweepExtension(Section):
@@ -265,7 +265,7 @@ class Compliance(Section):
     """Scene of `simulation.scenes`, with an object that is held."""
     masses: Annotated[tuple[PositiveFloat, ...], Distinct] = Field(default=(4.0,), min_length=1)
     """Object masses [kg]."""
-    partner_shares: Annotated[tuple[Share, ...], Distinct] = Field(default=(0.5,), min_length=1)
+    partner_shares: Annotated[tuple[SignedShare, ...], Distinct] = Field(default=(0.5,), min_length=1)
     """Fractions of the weight that the partner bears."""
     behaviours: Annotated[tuple[str, ...], Distinct] = ("path", "follower", "leader", "stopping", "tugging", "lagging")
     """Partner behaviours, one case each; the last two never occur in training."""

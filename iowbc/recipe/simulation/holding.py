@@ -83,11 +83,9 @@ Held = Annotated[dict[str, float], HELD, BeforeValidator(_behaviour_by_name)]
 
 def held_delay_problems(section: Section, path: str, simulation: SimulationSettings) -> Iterator[tuple[str, str]]:
     """Delays below a section that are fixed beyond the delay lines of the simulation."""
-    longest = simulation.randomization.longest_latency
-    source = "simulation.randomization.longest_latency"
-    limits: dict[str, tuple[float, str]] = dict.fromkeys(LATENCIES, (longest, source))
-    source = "the longest of simulation.partner.delay and .lagging.delay"
-    limits["partner_delay"] = simulation.partner.longest_delay, source
+    buffered = simulation.randomization.longest_latency, "simulation.randomization.longest_latency"
+    felt = simulation.partner.longest_delay, "the longest of simulation.partner.delay and .lagging.delay"
+    limits: dict[str, tuple[float, str]] = dict.fromkeys(LATENCIES, buffered) | {"partner_delay": felt}
     for place, held in marked_fields(section, path, HELD):
         for name in limits.keys() & held.keys():
             limit, source = limits[name]
