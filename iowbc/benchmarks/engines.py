@@ -214,10 +214,10 @@ def _hold_base(simulation: Simulation) -> None:
 def _edit(simulation: Simulation, **changes: tuple[int, float]) -> None:
     """Sets entries of the models' fields, by field: place and value."""
     for world in simulation.worlds:
-        saved = world.snapshot()
+        fields = world.arrays()
         for name, (place, value) in changes.items():
-            saved[name][:, place] = value
-        world.restore(saved)
+            fields[name][:, place] = value
+        world.restore(fields, np.arange(len(world.rows)))
 
 
 def _run(
