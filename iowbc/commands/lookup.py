@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 SWEEP_RECORD, COMPARISON_RECORD = "sweep.json", "runs.json"
 """Files of a sweep with its points, and of a comparison with its runs."""
-SWEEP_TABLE, SWEEP_FIGURE, SWEEP_POINTS = "table.md", "parallel.png", "points.csv"
+SWEEP_TABLE, SWEEP_POINTS = "table.md", "points.csv"
 """Files of a sweep with its results."""
 FILM = "side_by_side.mp4"
 """Film of one trial of a comparison."""
@@ -173,7 +173,7 @@ def record_sweep(found: Sweep, folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     points = {point.name: dict(point.settings) for point in found.points}
     if read_json(folder / SWEEP_RECORD).get("points") != points:
-        for name in (SWEEP_TABLE, SWEEP_FIGURE, SWEEP_POINTS):
+        for name in (SWEEP_TABLE, SWEEP_POINTS):
             (folder / name).unlink(missing_ok=True)
     write_whole(folder / SWEEP_RECORD, json.dumps({"axes": found.axes, "points": points}, indent=1))
 

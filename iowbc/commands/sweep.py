@@ -12,7 +12,7 @@ import typer
 from rich.console import Console
 
 from iowbc.commands import completion, options
-from iowbc.commands.lookup import SWEEP_FIGURE, SWEEP_TABLE, named, record_sweep
+from iowbc.commands.lookup import SWEEP_TABLE, named, record_sweep
 from iowbc.commands.plan import in_all, plan_sweep, planned
 from iowbc.commands.points import Endings, PointProcess, PointRun, PointThread, run_points
 from iowbc.commands.printed import shown_path, stdout_console, tell
@@ -177,7 +177,7 @@ def _conclude(
     if record is not None:
         means = {f"{line.label}/{name}": mean for line in lines for name, mean in line.means.items()}
         figures = {name: mean for name, mean in means.items() if math.isfinite(mean)}
-        record.describe(markdown(results), figures, [folder / SWEEP_FIGURE, folder / SWEEP_TABLE])
+        record.describe(markdown(results), figures, [folder / SWEEP_TABLE])
     console.print(drawn(results, console.width))
     for path in paths:
         tell(console, shown_path(path))

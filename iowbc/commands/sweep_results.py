@@ -1,24 +1,38 @@
-"""Results of a sweep: a table and a figure over its settings, seeds together, and every point's metrics."""
+"""Results of a sweep: a table over its settings, seeds together, and every point's metrics."""
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from pydantic import JsonValue
 
-from iowbc.commands.lookup import SWEEP_FIGURE, SWEEP_POINTS, SWEEP_TABLE
+from iowbc.commands.lookup import SWEEP_POINTS, SWEEP_TABLE
 from iowbc.commands.results import headline
 from iowbc.evaluation.report.statistics import mean_half_width
 from iowbc.recipe.recipe import PIPELINE, SEEDS
 from iowbc.recipe.sweep import Point, Sweep, written
-from iowbc.report.parallel import Line, parallel_coordinates
 from iowbc.report.runs import Run
-from iowbc.results.picture import write_figure
 from iowbc.results.table import Table, heads, markdown, measured
 
 OUTCOMES_SHOWN = 6
-"""Maximum number of metrics in the table and the figure; those of the last stages come first."""
+"""Maximum number of metrics in the table; those of the last stages come first."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """The points that differ in their seeds alone."""
+
+    label: str
+    settings: Mapping[str, JsonValue]
+    """By the last word of their paths, or the whole path where two end alike."""
+    runs: int
+    means: Mapping[str, float]
+    """Mean of each outcome; all lines have the same. NaN where there is none, as in the next."""
+    halves: Mapping[str, float]
+    """Half the interval of each mean."""
 
 
 def outcomes(sweep: Sweep, found: Mapping[str, Run]) -> list[Line]:
@@ -45,7 +59,7 @@ def outcomes(sweep: Sweep, found: Mapping[str, Run]) -> list[Line]:
                 alike = len(values) > 1 and not np.ptp(values)
                 means[name], halves[name] = float(values.mean()), 0.0 if alike else mean_half_width(values)
         label = ", ".join(f"{name} {written(value)}" for name, value in own.items()) or sweep.name
-        lines.append(Line(label, own, means, halves, [{name: _metric(run, name) for name in metrics} for run in runs]))
+        lines.append(Line(label, own, len(runs), means, halves))
     return lines
 
 
@@ -75,18 +89,16 @@ def _chosen(runs: Sequence[Run]) -> tuple[str, ...]:
 def write_results(
     sweep: Sweep, lines: Sequence[Line], found: Mapping[str, Run], states: Mapping[str, str], folder: Path
 ) -> list[Path]:
-    """Write table, figure and points; returns their paths."""
-    paths = [folder / name for name in (SWEEP_TABLE, SWEEP_FIGURE, SWEEP_POINTS)]
+    """Write table and points; returns their paths."""
+    paths = [folder / name for name in (SWEEP_TABLE, SWEEP_POINTS)]
     paths[0].write_text(markdown(table(sweep, lines)), encoding="utf-8")
-    title = f"{sweep.name}: means over seeds (thick), 95 % intervals (bars), single runs (thin)"
-    write_figure(parallel_coordinates(lines, title), paths[1])
     rows = []
     for point in sweep.points:
         row = {"point": point.name, "state": states.get(point.name, "waits"), **point.settings}
         for stage, artifact in found[point.name].artifacts.items() if point.name in found else ():
             row |= {f"{stage}/{name}": value for name, value in artifact.metrics.items()}
         rows.append(row)
-    pd.DataFrame(rows).to_csv(paths[2], index=False)
+    pd.DataFrame(rows).to_csv(paths[1], index=False)
     return paths
 
 
@@ -95,7 +107,7 @@ def table(sweep: Sweep, lines: Sequence[Line]) -> Table:
     rows = [
         (
             *map(written, line.settings.values()),
-            str(len(line.runs)),
+            str(line.runs),
             *(measured(mean, line.halves[name], ".4g", ".2g", none="") for name, mean in line.means.items()),
         )
         for line in lines

@@ -32,7 +32,6 @@ def test_points_share_stages_and_are_summed_up(workplace: Workplace) -> None:
     table = (folder / "table.md").read_text().splitlines()
     assert table[2] == "| steps | seeds | export count |"
     assert table[4] == "| 4096 | 2 | 3 ± 0 |"
-    assert (folder / "parallel.png").stat().st_size > 10_000
     with (folder / "points.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert [(row["seed"], row["teacher.steps"], row["state"]) for row in rows][1] == ("0", "8192", "done")

@@ -1,8 +1,7 @@
 """Drake steps the same worlds as MuJoCo: both agree where they must, and all scenes can be played."""
 
-from copy import deepcopy
-
 import sys
+from copy import deepcopy
 
 import numpy as np
 import pytest

@@ -28,7 +28,8 @@ def test_a_failed_episode_goes_on_from_one_to_two_periods_before(make: Make) -> 
                 continue
             again += 1
             steps = env.batch.memory.steps[row]
-            assert steps % 10 == 0 and 10 <= before[row] - steps <= 20
+            assert steps % 10 == 0
+            assert 10 <= before[row] - steps <= 20
             assert env.batch.snapshot()["task/episode_key"][row] == key[row]
     assert again > 5
 
@@ -43,7 +44,8 @@ def test_the_same_actions_fail_in_the_same_way(make: Make) -> None:
         _, _, done, infos = env.step(actions(0, 4))
         for row in _failed(done, infos):
             falls[row].append(int(before[row]))
-    assert sum(map(len, falls)) > 10 and all(len(set(steps)) <= 1 for steps in falls), falls
+    assert sum(map(len, falls)) > 10
+    assert all(len(set(steps)) <= 1 for steps in falls), falls
 
 
 def _failed(done: Any, infos: list[dict[str, Any]]) -> list[int]:
