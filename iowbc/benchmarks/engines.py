@@ -214,10 +214,10 @@ def _hold_base(simulation: Simulation) -> None:
 def _edit(simulation: Simulation, **changes: tuple[int, float]) -> None:
     """Sets entries of the models' fields, by field: place and value."""
     for world in simulation.worlds:
-        fields = world.arrays()
+        saved = world.snapshot()
         for name, (place, value) in changes.items():
-            fields[name][:, place] = value
-        world.restore(fields, np.arange(len(world.rows)))
+            saved[name][:, place] = value
+        world.restore(saved)
 
 
 def _run(

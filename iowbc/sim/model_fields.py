@@ -96,16 +96,18 @@ class ModelFields:
         self._fields["geom_rbound"][ids, geom] = np.sqrt(np.sum(half * half, axis=1))
         self._fields["geom_aabb"][ids, geom, 3:] = half
 
-    def arrays(self) -> dict[str, Array]:
-        """All fields that may differ."""
-        return self._fields
+    def snapshot(self) -> dict[str, Array]:
+        """Copies of all fields that may differ."""
+        return {name: field.copy() for name, field in self._fields.items()}
 
     def of(self, index: int) -> dict[str, Array]:
         """Fields of one environment."""
         return {name: field[index] for name, field in self._fields.items()}
 
-    def restore(self, values: Mapping[str, Any], ids: Indices) -> None:
-        """Sets the fields of some environments, (k,), to their rows of earlier `arrays`."""
+    def restore(self, values: Mapping[str, Any]) -> None:
+        """Inverse of `snapshot`. Values of earlier versions lack the object's mass: it was that of the body."""
+        thing = self._layout.object
+        values = {"object_mass": 0.0 if thing is None else values["body_mass"][..., thing], **values}
         for name, field in self._fields.items():
-            field[ids] = values[name][ids]
-        self._derive(ids)
+            field[...] = values[name]
+        self._derive(np.arange(len(self.body_mass)))

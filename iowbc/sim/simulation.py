@@ -173,7 +173,7 @@ class Simulation:
         self.target[which] = joint_position
         state = self.state
         state.diverged[which] = False
-        for _, world, ids, chosen in self._parts(which):
+        for world, ids, chosen in self._parts(which):
             rows = which[chosen]
             drawn = {name: values[rows] for name, values in self.drawn.items()}
             world.reset(ids, joint_position[chosen], pitch[chosen], drawn)
@@ -247,15 +247,14 @@ class Simulation:
         self._noise = random.noise(self._episode_key, self.clock.view(np.uint64), self._noise.shape[1])
         self._sensing.deliver(self._noise[:, : self._sensing.noise_width])
 
-    def _parts(self, which: Indices) -> Iterator[tuple[str, World, Indices, Indices]]:
-        """Scenes and worlds that some environments belong to, with their indices in the world, ascending, and in
-        `which`."""
+    def _parts(self, which: Indices) -> Iterator[tuple[World, Indices, Indices]]:
+        """Worlds that some environments belong to, with their indices in the world, ascending, and in `which`."""
         order = np.argsort(which)
         owner = self._owner[which[order]]
         for number, world in enumerate(self.worlds):
             chosen = order[owner == number]
             if len(chosen):
-                yield self._scenes[number], world, self._index[which[chosen]], chosen
+                yield world, self._index[which[chosen]], chosen
 
     def _squeeze(self) -> Array:
         """Force with which the arms press each hand against a held object, (n,) [N]: constant where friction alone
@@ -263,20 +262,8 @@ class Simulation:
         needed = self._by_friction * self._borne / np.maximum(self.drawn["surface_friction"], TINY)
         return self._pressed + np.minimum(needed, self._strength)
 
-    def arrays(self) -> dict[str, Array]:
-        """The complete state by name, one row per environment, those of `scene/NAME/` in the scene's own order;
-        overwritten by each step."""
-        own = self._memory()
-        for scene, world in zip(self._scenes, self.worlds, strict=True):
-            own |= {f"scene/{scene}/{name}": values for name, values in world.arrays().items()}
-        return own
-
-    def rows(self, which: Indices) -> dict[str, Indices]:
-        """Rows of some environments, ascending, in the arrays of each scene, by the beginning of their names."""
-        return {f"scene/{scene}/": ids for scene, _, ids, _ in self._parts(which)}
-
     def _memory(self) -> dict[str, Array]:
-        """The state without that of the worlds."""
+        """State arrays by their names in a snapshot, one row per environment, without those of the worlds."""
         own: dict[str, Array] = {"episode": self.episode, "clock": self.clock, "episode_key": self._episode_key}
         own |= {"target": self.target, "feed": self.feed, "robot_mass": self._robot_mass, "borne": self._borne}
         own["noise"] = self._noise
@@ -294,18 +281,23 @@ class Simulation:
         delayed = {f"ring/{name}": own.pop(name).swapaxes(0, 1) for name in DELAY_LINES}
         return delayed | {f"simulation/{name}": values for name, values in own.items()}
 
-    def restore(self, saved: Mapping[str, Array], which: Indices | None = None) -> None:
-        """Some environments, (k,), or all, continue bit for bit from their rows of earlier `arrays`, those of the same
-        robot, recipe, environments and scenes; other entries are ignored."""
-        which = np.arange(self.n) if which is None else which
-        self.hold({name: values[which] for name, values in _under("simulation/fixed/", saved).items()}, which)
+    def snapshot(self) -> dict[str, Array]:
+        """Copies of the complete state, one row per environment; `restore` continues bit for bit."""
+        saved = {name: values.copy() for name, values in self._memory().items()}
+        for scene, world in zip(self._scenes, self.worlds, strict=True):
+            saved |= {f"scene/{scene}/{name}": values for name, values in world.snapshot().items()}
+        return saved
+
+    def restore(self, saved: Mapping[str, Array]) -> None:
+        """Inverse of `snapshot`, for the same robot, recipe, environments and scenes; other entries are ignored."""
+        self.hold(_under("simulation/fixed/", saved))
         for name, values in self._memory().items():
             if name not in saved or saved[name].shape != values.shape:
                 found = saved[name].shape if name in saved else "nothing"
                 raise ValueError(f"snapshot of another simulation: {name} is {found}, expected {values.shape}")
-            values[which] = saved[name][which]
-        for scene, world, ids, _ in self._parts(which):
-            world.restore(_under(f"scene/{scene}/", saved), ids)
+            values[...] = saved[name]
+        for scene, world in zip(self._scenes, self.worlds, strict=True):
+            world.restore(_under(f"scene/{scene}/", saved))
         self.partner.derive()
 
     def world_of(self, env: int) -> tuple[World, int]:

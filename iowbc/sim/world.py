@@ -324,18 +324,19 @@ class World:
         """Positions of the grips, (n, 2, 3) [m]."""
         return self._sites[:, self.layout.grips]
 
-    def arrays(self) -> dict[str, Array]:
-        """Complete state of the simulations; overwritten by each step."""
-        return {**self._memory, "state": self.batch.state, "warnings": self._warnings, **self.fields.arrays()}
+    def snapshot(self) -> dict[str, Array]:
+        """Complete state of the simulations."""
+        own = {name: array.copy() for name, array in self._memory.items()}
+        return own | {"state": self.batch.state.copy(), "warnings": self._warnings.copy()} | self.fields.snapshot()
 
-    def restore(self, values: Mapping[str, Array], ids: Indices) -> None:
-        """Some simulations, (k,), continue bit for bit from their rows of earlier `arrays`."""
-        self.fields.restore(values, ids)
+    def restore(self, values: Mapping[str, Array]) -> None:
+        """Inverse of `snapshot`: the simulations then continue bit for bit."""
+        self.fields.restore(values)
         for name, array in self._memory.items():
-            array[ids] = values[name][ids]
-        self.batch.state[ids] = values["state"][ids]
-        self._warning_counts[ids] = self._warnings[ids] = values["warnings"][ids]
-        self.batch.forward(ids, stage=VELOCITY)
+            array[...] = values[name]
+        self.batch.state[...] = values["state"]
+        self._warning_counts[...] = self._warnings[...] = values.get("warnings", 0)
+        self.batch.forward(stage=VELOCITY)
         self._mass_cache()
 
 

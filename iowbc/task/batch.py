@@ -25,7 +25,6 @@ from iowbc.task.planned_pushes import PlannedPulls, PlannedPushes
 from iowbc.task.privileged import Truth
 from iowbc.task.record import statistics
 from iowbc.task.record.signals import Recorded, write_signals
-from iowbc.task.retries import Retries
 from iowbc.task.schedule import Schedule
 from iowbc.task.vector.shared import Buffers
 
@@ -74,7 +73,6 @@ class Batch:
         arms = None if recipe.eval.public is None else recipe.eval.public.arms
         self._own_arms = np.flatnonzero([arms == "own" or (arms == "free" and name == FREE) for name in scenes])
         """Environments in which a public controller moves its arms, (k,)."""
-        self._retries = Retries(task.curriculum, period, self._state, self.simulation.rows)
 
     def targets(self, action: Array) -> Array:
         """Joint targets of an action (n, 15) in the next step, (n, joints) [rad]."""
@@ -152,25 +150,15 @@ class Batch:
         buffers["done"][:] = done
         buffers["truncated"][:] = ending.truncated
         self._observe(judgement.motion)
-        if done.any():
-            self._start_again(ending)
-        self._retries.keep(memory.steps)
-
-    def _start_again(self, ending: Ending) -> None:
-        """Counts the episodes that have ended; tries them again or starts new ones."""
-        memory, buffers, done = self.memory, self.buffers, ending.done
+        if not done.any():
+            return
         which = np.flatnonzero(done)
         buffers["terminal_observation"][which] = buffers["observation"][which]
         buffers["episode_return"][which] = memory.total[which]
         buffers["episode_length"][which] = memory.steps[which]
         statistics.count_endings(buffers, ending, self._schedule.causes(ending), which)
         self._schedule.promote(ending, which)
-        again = self._retries.chosen(ending.failed, self._schedule.episode_key, memory.attempt)
-        if len(again):
-            attempt = memory.attempt[again] + 1
-            self._return_to(self._retries.states(again), again)
-            memory.attempt[again] = attempt
-        self._observe(self.begin(np.setdiff1d(which, again)), which)
+        self._observe(self.begin(which), which)
 
     def begin(self, which: Indices) -> Motion:
         """Starts new episodes in some environments, (k,). Returns the motion of all."""
@@ -223,29 +211,21 @@ class Batch:
         """Sets the curriculum levels (n, axes), from the next episodes on."""
         self._schedule.set_levels(levels)
 
-    def _state(self) -> dict[str, Array]:
-        return self._task_arrays() | self.simulation.arrays()
-
-    def _task_arrays(self) -> dict[str, Array]:
-        schedule = self._schedule
-        own = vars(self.memory) | {"key": schedule.key, "episode_key": schedule.episode_key}
-        return {f"task/{name}": values for name, values in own.items()}
-
     def snapshot(self) -> dict[str, Array]:
         """Complete state, one row per environment."""
-        buffers = {f"buffer/{name}": values for name, values in self.buffers.items()}
-        return {name: values.copy() for name, values in (self._state() | buffers | self._retries.arrays()).items()}
+        schedule = self._schedule
+        own = vars(self.memory) | {"key": schedule.key, "episode_key": schedule.episode_key}
+        saved = {f"task/{name}": values.copy() for name, values in own.items()}
+        saved |= {f"buffer/{name}": values.copy() for name, values in self.buffers.items()}
+        return saved | self.simulation.snapshot()
 
     def restore(self, saved: Mapping[str, Array]) -> None:
         """Inverse of `snapshot`: the environments then continue bit for bit."""
+        for name, values in vars(self.memory).items():
+            values[...] = saved[f"task/{name}"]
+        schedule = self._schedule
+        schedule.key[:], schedule.episode_key[:] = saved["task/key"], saved["task/episode_key"]
         for name, values in self.buffers.items():
             values[:] = saved[f"buffer/{name}"]
-        self._retries.restore(saved)
-        self.simulation.reseed(saved["task/key"])
-        self._return_to(saved, np.arange(self.n))
-
-    def _return_to(self, saved: Mapping[str, Array], which: Indices) -> None:
-        """Some environments, (k,), continue from their rows of a state."""
-        for name, values in self._task_arrays().items():
-            values[which] = saved[name][which]
-        self.simulation.restore(saved, which)
+        self.simulation.reseed(schedule.key)
+        self.simulation.restore(saved)

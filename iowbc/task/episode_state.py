@@ -39,8 +39,6 @@ class EpisodeState:
         """True where the episode commands velocities, (n,)."""
         self.infeasible = np.zeros(n, np.bool_)
         """True where the crate's rolling resistance exceeds the friction of the feet, (n,)."""
-        self.attempt = np.zeros(n, np.int64)
-        """Attempts at the episode before this one, (n,); see `task.curriculum.retry`."""
         self.failed = np.zeros(n, np.bool_)
         """True where the episode of `failed_key` has not been survived since, (n,)."""
         self.failed_key = np.zeros(n, np.uint64)
@@ -100,4 +98,3 @@ class EpisodeState:
         for name in PER_EPISODE_FIELDS:
             getattr(self, name)[which] = 0
         self.undisturbed[which] = NEVER_DISTURBED
-        self.attempt[which] = 0

@@ -105,11 +105,6 @@ class Curriculum(Section):
     """Probability that an environment repeats its last failed episode with all its random quantities (loads, partner,
     latencies, commands, disturbances), scaled by its present levels. A success discards the episode. 0: always a new
     episode."""
-    retry: float = Field(default=0.0, ge=0.0, le=1.0, json_schema_extra=LATER)
-    """Probability that a failed episode goes on from its state between one and two `retry_period`s before the failure,
-    with the same disturbance and another exploration noise. Levels change by the last attempt. 0: never."""
-    retry_period: float = Field(default=1.0, gt=0.0, json_schema_extra=LATER)
-    """Time between the states that are kept for it [s]."""
     blame: float = Field(default=1.0, ge=0.0)
     """Time after an impulse or a push within which a fall is attributed to it [s]."""
     limit: float = Field(default=2.0, ge=0.0, le=2.0)

@@ -69,8 +69,7 @@ def split(arrays: Mapping[str, NDArray[Any]], scenes: Sequence[Sequence[str]]) -
     for name, values in arrays.items():
         start = 0
         for part, group in zip(parts, scenes, strict=True):
-            scene = name.partition("scene/")[2].partition("/")[0]  # also of the states kept by `Retries`
-            count = group.count(scene) if scene else len(group)
+            count = group.count(name.split("/")[1]) if name.startswith("scene/") else len(group)
             if count:
                 part[name] = values[start : start + count]
             start += count
