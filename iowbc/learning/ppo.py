@@ -25,6 +25,7 @@ from iowbc.learning.gaussian import divergence, entropy, log_density
 from iowbc.learning.history_actor import student_architecture
 from iowbc.learning.networks import Mirrors, mirrors_as_json
 from iowbc.learning.normalization import Normalization
+from iowbc.learning.perceptron import Perceptron
 from iowbc.learning.policy import ActorCritic
 from iowbc.learning.rollout import Samples
 from iowbc.recipe.skill.skill import SkillLearning
@@ -77,6 +78,11 @@ class Learner:
         self.learning_rate = teacher.learning_rate
         self.explained = 0.0
         """Explained variance of the value targets of the last rollout."""
+        self._former: tuple[Perceptron, Tensor] | None = None
+        """Actor and log std before the last update; None before the first one in this process."""
+        self.gain: float | None = None
+        """Mean normalised advantage that the last update gained, on the rollout after it: an estimate from samples that
+        the update has not seen, while -`policy_loss` is one from those that it has."""
         self.seconds = dict.fromkeys(("simulation", "inference", "learning"), 0.0)
         """Time per part since the last reset [s]."""
         self.caution = 1.0
@@ -152,6 +158,10 @@ class Learner:
         rewards[cut_steps, environments] += settings.gamma * values[shape[1] :]
         samples.finish(rewards, found.ended, values[: shape[1]], settings.gamma, settings.gae_lambda)
         self.explained = explained_variance(columns["value"], columns["target"])
+        if self._former is not None:
+            former, advantage = torch.cat(self.in_parallel(self._former_density, samples.flat)), columns["advantage"]
+            normal = (advantage - advantage.mean()).flatten() / (advantage.std() + 1e-8)
+            self.gain = float((normal * (1.0 - torch.exp(former - columns["log_density"].flatten()))).mean())
         self.normalization.observe(self.policy.normalizer.newest(rows))
 
     def _tensor(self, values: Array) -> Tensor:
@@ -171,6 +181,15 @@ class Learner:
             own["log_density"].copy_(log_density(own["action"], own["mean"], policy.log_std))
             own["value"].copy_(policy.critic.head(policy.critic.hidden(own["observation"]))[:, 0])
 
+    def _former_density(self, samples: Tensor) -> Tensor:
+        """Log density of the actions before the last update."""
+        assert self._former is not None
+        (actor, log_std), own = self._former, self.samples.named(samples)
+        with torch.inference_mode():
+            with reduced(self.settings.precision):
+                hidden = actor.hidden(own["observation"])
+            return log_density(own["action"], actor.head(hidden), log_std)
+
     def restart_exploration(self) -> None:
         """Reset the standard deviation once, before the first update after the recipe's restart step."""
         restart, passed = self.settings.restart, self.steps - self.settings.rollout * self.env.num_envs
@@ -187,6 +206,7 @@ class Learner:
         for group, own in zip(optimizer.param_groups, rates, strict=True):
             group["lr"] = own
         before = self.policy.log_std.detach().clone()
+        self._former = copy.deepcopy(self.policy.actor), before
         samples = self.samples.flat
         found: list[Tensor] = []
         for _ in range(settings.epochs):
@@ -196,6 +216,7 @@ class Learner:
         means = dict(zip(FIGURES, every.mean((0, 1)).tolist(), strict=True))
         last = dict(zip(FIGURES, every[-1].mean(0).tolist(), strict=True))
         values = means | {"kl": last["kl"], "approx_kl": last["approx_kl"], "explained_variance": self.explained}
+        values |= {} if self.gain is None else {"gain": self.gain}
         values |= {"std": float(torch.exp(self.policy.log_std.detach()).mean()), "learning_rate": rate}
         if self._policy_learns:
             self.learning_rate = adapted(rate, last["kl"], settings, self.caution)

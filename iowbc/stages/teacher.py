@@ -37,6 +37,7 @@ PANELS = (
     "train/learning_rate",
     "train/std",
     "train/explained_variance",
+    "train/gain",
     "steps_per_second",
 )
 """Shown in the figure of the learning curves, before the reward's terms."""

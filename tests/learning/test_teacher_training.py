@@ -43,6 +43,29 @@ def test_a_resumed_training_ends_bit_for_bit_where_an_unbroken_one_does(symmetry
         np.testing.assert_array_equal(found[name], value, err_msg=name)
 
 
+class Lottery(PointMasses):
+    """Rewards that do not depend on actions."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.random = np.random.default_rng(0)
+
+    def step_wait(self) -> Any:
+        observed, reward, ended, infos = super().step_wait()
+        return observed, self.random.normal(size=len(reward)), ended, infos
+
+
+@pytest.mark.parametrize(("task", "learnable"), [(PointMasses, True), (Lottery, False)])
+def test_the_gain_of_an_update_on_the_next_rollout_shows_whether_it_was_noise(task: Any, learnable: bool) -> None:
+    some = TeacherTraining(SETTINGS.model_copy(update={"steps": 16 * 8 * 60}), task(), MIRRORS, seed=3)
+    figures = [some.update() for _ in range(60)]
+    assert "train/gain" not in figures[0]
+    gain = np.mean([one["train/gain"] for one in figures[1:]])
+    promised = np.mean([-one["train/policy_loss"] for one in figures[:-1]])
+    assert promised > 0.001
+    assert (gain > 0.5 * promised) == learnable
+
+
 @pytest.mark.parametrize("symmetry", ["construction", "none"])
 def test_what_the_value_alone_is_told_moves_no_action(symmetry: Any) -> None:
     settings = SETTINGS.model_copy(update={"symmetry": symmetry})
