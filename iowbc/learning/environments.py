@@ -28,6 +28,9 @@ class Environments(Protocol):
     def roll(self, rollout_policy: RolloutPolicy, steps: int) -> Trajectories:
         """Make a rollout of `steps` control steps."""
 
+    def copy(self, source: NDArray[np.int64]) -> NDArray[np.float32]:
+        """Each environment continues from the state of environment `source`, (num_envs,); returns observations."""
+
     def statistics(self) -> dict[str, float]:
         """Statistics since the last call."""
 
@@ -86,6 +89,11 @@ class HistoryEnvironments(VecEnvWrapper):  # type: ignore[misc]
     def _beside(self, frames: NDArray[np.float32], row: NDArray[np.float32]) -> NDArray[np.float32]:
         """Rows of histories followed by s_priv."""
         return np.concatenate([frames.reshape(len(row), -1), row[:, self._size :]], axis=1)
+
+    def copy(self, source: NDArray[np.int64]) -> NDArray[np.float32]:
+        """See `Environments`."""
+        self._history.frames[:] = self._history.frames[source]
+        return self._beside(self._history.frames, self.venv.copy(source))
 
     def statistics(self) -> dict[str, float]:
         """Statistics since the last call."""

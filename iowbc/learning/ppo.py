@@ -22,6 +22,7 @@ from iowbc.arrays import Array
 from iowbc.learning.as_numpy import acting_policy
 from iowbc.learning.computing import ParallelBatch, reduced
 from iowbc.learning.gaussian import divergence, entropy, log_density
+from iowbc.learning.groups import drawn_leaders, without_common_part
 from iowbc.learning.history_actor import student_architecture
 from iowbc.learning.networks import Mirrors, mirrors_as_json
 from iowbc.learning.normalization import Normalization
@@ -124,6 +125,8 @@ class Learner:
         policy, env, settings = self.policy, self.env, self.settings
         if self.observation is None:
             self.observation = env.reset()
+        if settings.group > 1:
+            self.observation = env.copy(drawn_leaders(env.num_envs, settings.group))
         self.normalization.frozen = self.steps >= settings.statistics_until
         begin = time.perf_counter()
         with torch.inference_mode():
@@ -158,6 +161,9 @@ class Learner:
         rewards[cut_steps, environments] += settings.gamma * values[shape[1] :]
         samples.finish(rewards, found.ended, values[: shape[1]], settings.gamma, settings.gae_lambda)
         self.explained = explained_variance(columns["value"], columns["target"])
+        if settings.group > 1:
+            own = without_common_part(columns["advantage"].cpu().numpy(), found.ended, settings.group)
+            columns["advantage"].copy_(torch.from_numpy(own))
         if self._former is not None:
             former, advantage = torch.cat(self.in_parallel(self._former_density, samples.flat)), columns["advantage"]
             normal = (advantage - advantage.mean()).flatten() / (advantage.std() + 1e-8)

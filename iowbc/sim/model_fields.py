@@ -62,9 +62,9 @@ class ModelFields:
         fields["geom_friction"][ids[:, None], self._layout.foot_geoms, 0] = drawn["ground_friction"][:, None]
         if self._layout.object is not None:
             self._write_object(ids, drawn)
-        self._derive(ids)
+        self.derive(ids)
 
-    def _derive(self, ids: Indices) -> None:
+    def derive(self, ids: Indices) -> None:
         """Recomputes derived constants; the compliance of wheels does not depend on their last direction."""
         self._batch.set_const(ids)
         if self._yielding is not None:
@@ -96,18 +96,11 @@ class ModelFields:
         self._fields["geom_rbound"][ids, geom] = np.sqrt(np.sum(half * half, axis=1))
         self._fields["geom_aabb"][ids, geom, 3:] = half
 
-    def snapshot(self) -> dict[str, Array]:
-        """Copies of all fields that may differ."""
-        return {name: field.copy() for name, field in self._fields.items()}
+    @property
+    def arrays(self) -> dict[str, Array]:
+        """All fields that may differ."""
+        return self._fields
 
     def of(self, index: int) -> dict[str, Array]:
         """Fields of one environment."""
         return {name: field[index] for name, field in self._fields.items()}
-
-    def restore(self, values: Mapping[str, Any]) -> None:
-        """Inverse of `snapshot`. Values of earlier versions lack the object's mass: it was that of the body."""
-        thing = self._layout.object
-        values = {"object_mass": 0.0 if thing is None else values["body_mass"][..., thing], **values}
-        for name, field in self._fields.items():
-            field[...] = values[name]
-        self._derive(np.arange(len(self.body_mass)))

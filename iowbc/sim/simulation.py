@@ -300,6 +300,16 @@ class Simulation:
             world.restore(_under(f"scene/{scene}/", saved))
         self.partner.derive()
 
+    def copy(self, source: Indices, to: Indices) -> None:
+        """Environments `to`, (k,), continue from the states of environments `source`, (k,), of the same scenes, with
+        the same random quantities until their episodes end. They keep their own random sequences of episodes."""
+        for name, values in self._memory().items():
+            if name != "simulation/episode":
+                values[to] = values[source]
+        for world, ids, chosen in self._parts(to):
+            world.copy(self._index[source[chosen]], ids)
+        self.partner.derive()
+
     def world_of(self, env: int) -> tuple[World, int]:
         """The world of an environment, and its index there."""
         if not 0 <= env < self.n:

@@ -324,19 +324,31 @@ class World:
         """Positions of the grips, (n, 2, 3) [m]."""
         return self._sites[:, self.layout.grips]
 
+    def _arrays(self) -> dict[str, Array]:
+        """Complete state of the simulations, which each step overwrites."""
+        return {**self._memory, "state": self.batch.state, "warnings": self._warnings, **self.fields.arrays}
+
     def snapshot(self) -> dict[str, Array]:
-        """Complete state of the simulations."""
-        own = {name: array.copy() for name, array in self._memory.items()}
-        return own | {"state": self.batch.state.copy(), "warnings": self._warnings.copy()} | self.fields.snapshot()
+        """Copies of the complete state of the simulations."""
+        return {name: array.copy() for name, array in self._arrays().items()}
 
     def restore(self, values: Mapping[str, Array]) -> None:
         """Inverse of `snapshot`: the simulations then continue bit for bit."""
-        self.fields.restore(values)
-        for name, array in self._memory.items():
+        for name, array in self._arrays().items():
             array[...] = values[name]
-        self.batch.state[...] = values["state"]
-        self._warning_counts[...] = self._warnings[...] = values.get("warnings", 0)
-        self.batch.forward(stage=VELOCITY)
+        self._derive(np.arange(len(self.rows)))
+
+    def copy(self, source: Indices, to: Indices) -> None:
+        """Simulations `to`, (k,), continue from the states of simulations `source`, (k,)."""
+        for array in self._arrays().values():
+            array[to] = array[source]
+        self._derive(to)
+
+    def _derive(self, ids: Indices) -> None:
+        """Recomputes all that follows from the state of some simulations, after it was overwritten."""
+        self.fields.derive(ids)
+        self._warning_counts[ids] = self._warnings[ids]
+        self.batch.forward(ids, stage=VELOCITY)
         self._mass_cache()
 
 

@@ -25,14 +25,14 @@ WRITTEN = ("action", "counters", "terms")
 """Buffers that the learner also writes: actions, and statistics that it resets after reading."""
 
 
-def training_environments(job: Job, *, count: int, seed: int) -> VectorEnv:
-    """The environments of a job's recipe, here or on `rollout_actors`."""
+def training_environments(job: Job, *, count: int, seed: int, group: int = 1) -> VectorEnv:
+    """The environments of a job's recipe, here or on `rollout_actors`; `group`: see `VectorEnv`."""
     world = Specification(job.recipe, job.robot, job.inputs.get("rg-fit"))
     actors = job.recipe.execution.rollout_actors
     workers: int | Callable[[Setup], Workers] = job.workers
     if actors is not None and job.spread is not None:
         workers = partial(RemoteWorkers, job.spread, min(actors, job.spread.width))
-    return VectorEnv(world, num_envs=count, workers=workers, seed=seed)
+    return VectorEnv(world, num_envs=count, workers=workers, seed=seed, group=group)
 
 
 class RemoteWorkers(Workers):

@@ -82,7 +82,7 @@ def run(job: Job) -> None:
     seed = recipe.seed if settings.seed is None else settings.seed
     world = Specification(recipe, job.robot, job.inputs.get("rg-fit"))
     with ExitStack() as open_ones:
-        environments = training_environments(job, count=settings.environments, seed=seed)
+        environments = training_environments(job, count=settings.environments, seed=seed, group=settings.group)
         open_ones.enter_context(closing(environments))
         score, films = None, None
         if settings.check.every is not None:

@@ -16,7 +16,7 @@ from iowbc.recipe.simulation.holding import FREE
 from iowbc.robot.description import load_robot
 from iowbc.sim.simulation import Simulation
 from iowbc.task.endings import Ending
-from iowbc.task.episode_state import EpisodeState
+from iowbc.task.episode_state import PER_ENVIRONMENT_FIELDS, EpisodeState
 from iowbc.task.guidance import Guidance
 from iowbc.task.judge import Judge, Judgement
 from iowbc.task.layout import full_layout
@@ -210,6 +210,18 @@ class Batch:
     def set_levels(self, levels: Array) -> None:
         """Sets the curriculum levels (n, axes), from the next episodes on."""
         self._schedule.set_levels(levels)
+
+    def copy(self, source: Indices) -> None:
+        """Each environment continues from the state of environment `source`, (n,), of the same scene, with the same
+        random quantities until its episode ends. It keeps its levels and its own random sequence of episodes."""
+        to = np.flatnonzero(source != np.arange(self.n))
+        chosen = source[to]
+        for name, values in vars(self.memory).items():
+            if name not in PER_ENVIRONMENT_FIELDS:
+                values[to] = values[chosen]
+        for values in (self._schedule.episode_key, self.buffers["observation"]):
+            values[to] = values[chosen]
+        self.simulation.copy(chosen, to)
 
     def snapshot(self) -> dict[str, Array]:
         """Complete state, one row per environment."""

@@ -12,6 +12,8 @@ PER_EPISODE_FIELDS = (
     *("walked", "commanded", "covered", "heading_error", "total"),
 )
 """Fields that are zero at the start of an episode."""
+PER_ENVIRONMENT_FIELDS = ("episode", "level", "failed", "failed_key")
+"""Fields that outlast an episode."""
 NEVER_DISTURBED = 1_000_000
 """Control steps since a disturbance that has not happened yet."""
 

@@ -45,6 +45,10 @@ class PointMasses(VecEnv):  # type: ignore[misc]
     def reset(self) -> Any:
         return self.observed()
 
+    def copy(self, source: Any) -> Any:
+        self.masses[:], self.age[:] = self.masses[source], self.age[source]
+        return self.observed()
+
     def step_async(self, actions: Any) -> None:
         self.masses[:, 1] = 0.8 * self.masses[:, 1] + 0.4 * actions[:, 0]
         self.masses[:, 0] += 0.2 * self.masses[:, 1]

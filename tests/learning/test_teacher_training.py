@@ -26,14 +26,18 @@ def finish(some: TeacherTraining) -> TeacherTraining:
 
 @pytest.mark.parametrize("average", [None, 16 * 8 * 2])
 @pytest.mark.parametrize("symmetry", ["construction", "none"])
-def test_a_resumed_training_ends_bit_for_bit_where_an_unbroken_one_does(symmetry: str, average: int | None) -> None:
-    unbroken = finish(training(symmetry=symmetry, average_half_life=average))
-    broken = training(symmetry=symmetry, average_half_life=average)
+@pytest.mark.parametrize("group", [1, 2])
+def test_a_resumed_training_ends_bit_for_bit_where_an_unbroken_one_does(
+    symmetry: str, average: int | None, group: int
+) -> None:
+    changes = {"symmetry": symmetry, "average_half_life": average, "group": group}
+    unbroken = finish(training(**changes))
+    broken = training(**changes)
     for _ in range(3):
         broken.update()
     kept = {name: value.copy() for name, value in broken.arrays().items()}
     torch.manual_seed(99)
-    resumed = training(symmetry=symmetry, average_half_life=average)
+    resumed = training(**changes)
     resumed.restore(kept)
     assert resumed.steps == 3 * 16 * 8
     finish(resumed)
@@ -160,9 +164,9 @@ def test_what_the_value_alone_is_told_is_hidden_from_a_policy_that_knew_it() -> 
         assert float((given(told) - given(rows)).abs().max()) > 1e-3
 
 
-@pytest.mark.parametrize("symmetry", ["construction", "none"])
-def test_training_learns_to_bring_masses_to_rest(symmetry: str) -> None:
-    some = training(steps=16 * 8 * 60, symmetry=symmetry)
+@pytest.mark.parametrize(("symmetry", "group"), [("construction", 1), ("none", 1), ("none", 4)])
+def test_training_learns_to_bring_masses_to_rest(symmetry: str, group: int) -> None:
+    some = training(steps=16 * 8 * 60, symmetry=symmetry, group=group)
     first = some.update()["reward"]
     finish(some)
     assert some.update()["reward"] > 0.4 * first, "rewards are negative: squared distances and speeds"

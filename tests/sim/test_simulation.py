@@ -47,14 +47,6 @@ def test_restored_snapshot_continues_bit_for_bit(start):
     assert same(expected, wander(other, 15))
 
 
-def test_a_snapshot_of_before_light_objects_had_inertia_is_read(start):
-    simulation, other = start(Recipe(), SCENES, seed=1), start(Recipe(), SCENES, seed=1)
-    saved = {name: values for name, values in simulation.snapshot().items() if not name.endswith("/object_mass")}
-    assert len(saved) < len(simulation.snapshot())
-    other.restore(saved | {name: values for name, values in simulation.snapshot().items() if "/drawn/" in name})
-    assert same(wander(simulation, 5), wander(other, 5))
-
-
 def test_restored_snapshot_draws_the_same_next_episode(start, carrying):
     simulation, other = start(Recipe(), SCENES, seed=1), start(Recipe(), SCENES, seed=1)
     wander(simulation, 5)

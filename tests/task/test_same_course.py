@@ -113,3 +113,52 @@ def test_a_state_of_other_environments_is_refused(make: Make) -> None:
     many.reset()
     with pytest.raises(ValueError, match="expected 4"):
         many.restore(few.state())
+
+
+GROUPS = {f"task.scenes.{name}": 0.25 for name in ("free", "lift", "tyre", "push")}
+
+
+def test_copies_take_the_same_course_under_the_same_actions_until_their_episodes_end(make: Make) -> None:
+    env = make(num_envs=32, changes=GROUPS, group=4)
+    env.reset()
+    rollout(env, 15)
+    source = np.repeat(np.arange(2, 32, 4), 4)
+    before = env.state()
+    assert np.array_equal(env.copy(source), before["buffer/observation"][source])
+    ended = np.zeros(32, np.bool_)
+    for step in range(25):
+        same_actions = np.repeat(actions(step, 8), 4, axis=0)
+        observation, reward, done, _ = env.step(same_actions)
+        alone = np.repeat((ended | done).reshape(-1, 4).any(axis=1), 4)
+        assert np.array_equal(observation[~alone], observation[source][~alone])
+        assert np.array_equal(reward[~ended], reward[source][~ended])
+        ended |= done
+    assert ended.any()
+    assert not ended.all()
+    keys = env.state()["task/episode_key"][ended]
+    assert len(np.unique(keys)) == len(keys), "new episodes are their own"
+
+
+def test_copies_do_not_depend_on_the_number_of_workers_and_leave_the_others_alone(make: Make) -> None:
+    courses = []
+    source = np.arange(32)
+    source[4:8] = 5
+    for workers in (0, 3):
+        env = make(num_envs=32, workers=workers, changes=GROUPS, group=4)
+        env.reset()
+        rollout(env, 10)
+        env.copy(source)
+        courses.append(rollout(env, 30, start=10))
+    assert same(*courses)
+    env = make(num_envs=32, changes=GROUPS, group=4)
+    env.reset()
+    rollout(env, 10)
+    alone = rollout(env, 30, start=10)
+    untouched = np.setdiff1d(np.arange(32), [4, 6, 7])
+    assert np.array_equal(alone["observation"][:, untouched], courses[0]["observation"][:, untouched])
+    assert not np.array_equal(alone["observation"][:, 4], courses[0]["observation"][:, 4])
+
+
+def test_groups_that_workers_would_split_are_refused(make: Make) -> None:
+    with pytest.raises(ValueError, match="do not form groups of 4"):
+        make(num_envs=24, group=4)

@@ -55,9 +55,9 @@ class DrakeWorld(World):
         self._targets[ids] = self.control[ids, None]
         self._build(ids)
 
-    def restore(self, values: Mapping[str, Array]) -> None:
-        super().restore(values)
-        self._build(np.arange(len(self.rows)))
+    def _derive(self, ids: Indices) -> None:
+        super()._derive(ids)
+        self._build(ids)
 
     def _advance(self, given: Period, diverged: Mask) -> None:
         substeps, targets = self._steps.substeps, self._targets

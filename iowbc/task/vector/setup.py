@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from iowbc.robot.description import load_robot
+from iowbc.rollouts.blocks import block_size
 from iowbc.task.batch import Batch
 from iowbc.task.episodes import Episode
 from iowbc.task.layout import full_layout
@@ -26,18 +27,23 @@ class Setup:
     seed: int
     episodes: tuple[Episode, ...] | None = None
     """Episode of each environment; None draws episodes as in training."""
+    group: int = 1
+    """Environments of a group follow one another, share a scene and are stepped by the same process."""
 
     def __post_init__(self) -> None:
         if self.count < 1:
             raise ValueError(f"a vector environment has at least one environment, got {self.count}")
         if self.episodes is not None and len(self.episodes) != self.count:
             raise ValueError(f"{len(self.episodes)} episodes for {self.count} environments: give one to each")
+        if block_size(self.count) % self.group or self.count % self.group:
+            raise ValueError(f"{self.count} environments do not form groups of {self.group}")
 
     @property
     def scenes(self) -> list[str]:
         if self.episodes is not None:
             return [episode.scene for episode in self.episodes]
-        return scene_of(self.count, self.specification.recipe.task.scenes)
+        scenes = scene_of(self.count // self.group, self.specification.recipe.task.scenes)
+        return [name for name in scenes for _ in range(self.group)]
 
     def buffer_fields(self) -> Fields:
         """Arrays exchanged between the environments and the learner."""

@@ -45,17 +45,18 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
         workers: int | Callable[[Setup], Workers],
         seed: int,
         episodes: Sequence[Episode] | None = None,
+        group: int = 1,
         patience: float = PATIENCE,
     ) -> None:
         """`workers`: number of processes, 0 to step in this one, or a factory of `Workers`. `episodes`: one per
-        environment, restarted by every reset.
+        environment, restarted by every reset. `group`: size of the groups within which `copy` may copy states.
 
         The rollout does not depend on `workers`. Raises WorkerFailed when a worker dies, hangs for `patience` [s] or
         raises, and StageFailed where a function in a user's file cannot be used: a part of s_priv, or a term of the
         reward where episodes are drawn.
         """
         trials = None if episodes is None else tuple(episodes)
-        self.setup = Setup(specification, num_envs, seed, trials)
+        self.setup = Setup(specification, num_envs, seed, trials, group)
         recipe = specification.recipe
         self.layout = full_layout(recipe, load_robot(specification.robot))
         load_parts(recipe.task.observation)  # errors in them are raised here, before processes start
@@ -185,6 +186,13 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
         parts = split(own, [self._scenes[first:last] for first, last in self.workers.groups])
         self._call([Message(Batch.restore, (part,)) for part in parts])
         self._reset_seeds()
+
+    def copy(self, source: NDArray[np.int64]) -> NDArray[np.float32]:
+        """Each environment continues from the state of environment `source`, (num_envs,), of its own group, see
+        `Batch.copy`. Returns observations."""
+        parts = [source[first:last] - first for first, last in self.workers.groups]
+        self._call([Message(Batch.copy, (part,)) for part in parts])
+        return self._buffers["observation"].copy()
 
     def close(self) -> None:
         self.workers.close()
