@@ -117,9 +117,8 @@ class Teacher(PPO):
     """Parallel environments (paper: 2048). Few environments with many updates learn from fewer samples."""
     group: Literal[1, 2, 4] = Field(default=1, json_schema_extra=LATER)
     """Environments that begin each rollout in the same state, that of a random one of them, and meet the same random
-    quantities. Subtracting the mean advantage of the others removes four fifths of its variance in groups of four, at
-    the cost of fewer different states. Once the policy walks, updates of separate environments are mostly noise
-    (docs/log/groups.md). 1: separate environments, as in the paper."""
+    quantities. In groups of four, subtracting the mean advantage of the others removes four fifths of its variance, at
+    the cost of fewer different states (docs/log/groups.md). 1: separate environments, as in the paper."""
     rollout: int = Field(default=48, ge=2, le=10_000)
     """Control steps that each environment contributes to one update."""
     hidden: tuple[Width, ...] = Field(default=(512, 256, 128), max_length=DEEPEST)
