@@ -181,9 +181,7 @@ class Learner:
         """Write the policy's mean, the log density of the action and the value into rows of samples."""
         policy, own = self.policy, self.samples.named(samples)
         with torch.inference_mode():
-            with reduced(self.settings.precision):
-                hidden = policy.actor.hidden(own["observation"])
-            own["mean"].copy_(policy.actor.head(hidden))
+            own["mean"].copy_(self._mean(policy.actor, own))
             own["log_density"].copy_(log_density(own["action"], own["mean"], policy.log_std))
             own["value"].copy_(policy.critic.head(policy.critic.hidden(own["observation"]))[:, 0])
 
@@ -192,9 +190,12 @@ class Learner:
         assert self._former is not None
         (actor, log_std), own = self._former, self.samples.named(samples)
         with torch.inference_mode():
-            with reduced(self.settings.precision):
-                hidden = actor.hidden(own["observation"])
-            return log_density(own["action"], actor.head(hidden), log_std)
+            return log_density(own["action"], self._mean(actor, own), log_std)
+
+    def _mean(self, actor: Perceptron, samples: dict[str, Tensor]) -> Tensor:
+        with reduced(self.settings.precision):
+            hidden = actor.hidden(samples["observation"])
+        return actor.head(hidden)
 
     def restart_exploration(self) -> None:
         """Reset the standard deviation once, before the first update after the recipe's restart step."""
