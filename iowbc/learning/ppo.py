@@ -79,8 +79,8 @@ class Learner:
         self.learning_rate = teacher.learning_rate
         self.explained = 0.0
         """Explained variance of the value targets of the last rollout."""
-        self._former: tuple[Perceptron, Tensor] | None = None
-        """Actor and log std before the last update; None before the first one in this process."""
+        self.former: ActorCritic | None = None
+        """The policy before the last update; None before the first one and after a rollback."""
         self.gain: float | None = None
         """Mean normalised advantage that the last update gained, on the rollout after it: an estimate from samples that
         the update has not seen, while -`policy_loss` is one from those that it has."""
@@ -164,10 +164,7 @@ class Learner:
         if settings.group > 1:
             own = without_common_part(columns["advantage"].cpu().numpy(), found.ended, settings.group)
             columns["advantage"].copy_(torch.from_numpy(own))
-        if self._former is not None:
-            former, advantage = torch.cat(self.in_parallel(self._former_density, samples.flat)), columns["advantage"]
-            normal = (advantage - advantage.mean()).flatten() / (advantage.std() + 1e-8)
-            self.gain = float((normal * (1.0 - torch.exp(former - columns["log_density"].flatten()))).mean())
+        self.gain = None if self.former is None else self._gain(self.former)
         self.normalization.observe(self.policy.normalizer.newest(rows))
 
     def _tensor(self, values: Array) -> Tensor:
@@ -185,12 +182,18 @@ class Learner:
             own["log_density"].copy_(log_density(own["action"], own["mean"], policy.log_std))
             own["value"].copy_(policy.critic.head(policy.critic.hidden(own["observation"]))[:, 0])
 
-    def _former_density(self, samples: Tensor) -> Tensor:
-        """Log density of the actions before the last update."""
-        assert self._former is not None
-        (actor, log_std), own = self._former, self.samples.named(samples)
-        with torch.inference_mode():
-            return log_density(own["action"], self._mean(actor, own), log_std)
+    def _gain(self, former: ActorCritic) -> float:
+        """Mean normalised advantage of the samples by which the policy betters a former one."""
+
+        def ratio(samples: Tensor) -> Tensor:
+            own = self.samples.named(samples)
+            with torch.inference_mode():
+                density = log_density(own["action"], self._mean(former.actor, own), former.log_std)
+                return torch.exp(density - own["log_density"])
+
+        advantage = self.samples.columns["advantage"].flatten()
+        normal = (advantage - advantage.mean()) / (advantage.std() + 1e-8)
+        return float((normal * (1.0 - torch.cat(self.in_parallel(ratio, self.samples.flat)))).mean())
 
     def _mean(self, actor: Perceptron, samples: dict[str, Tensor]) -> Tensor:
         with reduced(self.settings.precision):
@@ -213,7 +216,7 @@ class Learner:
         for group, own in zip(optimizer.param_groups, rates, strict=True):
             group["lr"] = own
         before = self.policy.log_std.detach().clone()
-        self._former = copy.deepcopy(self.policy.actor), before
+        self.former = copy.deepcopy(self.policy)
         samples = self.samples.flat
         found: list[Tensor] = []
         for _ in range(settings.epochs):

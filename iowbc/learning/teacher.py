@@ -1,5 +1,6 @@
 """Teacher training by PPO (paper III-C)."""
 
+import copy
 import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -135,6 +136,7 @@ class TeacherTraining:
         """Inverse of `_learner_state`."""
         if self.average:
             self.average = acting_part(under("policy", learnt))
+        self.model.former = None
         checkpoint.restore_module(self.model.policy, under("policy", learnt))
         checkpoint.restore_optimizer(self.model.policy.optimizer, under("optimizer", learnt))
         self.model.normalization.restore(under("normalization", learnt))
@@ -152,6 +154,7 @@ class TeacherTraining:
             "counters": np.array([model.steps]),
             "learning_rate": np.array([model.learning_rate]),
             **prefixed("average", self.average),
+            **({} if model.former is None else prefixed("former", checkpoint.module_arrays(model.former))),
         }
 
     def begin(self, network: Network) -> None:
@@ -184,6 +187,9 @@ class TeacherTraining:
             self.average = under("average", arrays)
         self.best.restore(under("best", arrays))
         self.environments.restore(under("environment", arrays))
+        if former := under("former", arrays):
+            model.former = copy.deepcopy(model.policy)
+            checkpoint.restore_module(model.former, former)
         model.observation = np.array(arrays["observation"])
         model.steps = int(arrays["counters"][0])
         model.learning_rate = float(arrays["learning_rate"][0])
