@@ -2,7 +2,7 @@
 
 import shlex
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -28,16 +28,7 @@ REASON_INDENT = 4
 """Indentation of reasons below their stage [characters]."""
 
 
-@dataclass(frozen=True)
-class PlannedStage:
-    """A stage of one recipe among several."""
-
-    step: StagePlan
-    shared_with: str
-    """The earlier recipe that makes it; empty where this one does, or where it is cached."""
-
-
-Planned = Mapping[str, Sequence[PlannedStage]]
+Planned = Mapping[str, Sequence[StagePlan]]
 """The stages of each recipe, by its name."""
 
 
@@ -86,12 +77,12 @@ def plan_sweep(
     sweep, of_points = point_planners(asked, file, most)
     found = planned(of_points)
     if as_json:
-        stages = {
-            name: [step_data(stage.step) | {"shared_with": stage.shared_with or None} for stage in own]
-            for name, own in found.items()
-        }
         data = [
-            {"point": point.name, "settings": dict(point.settings), "stages": stages[point.name]}
+            {
+                "point": point.name,
+                "settings": dict(point.settings),
+                "stages": [step_data(step) | {"shared_with": step.shared_with or None} for step in found[point.name]],
+            }
             for point in sweep.points
         ]
         print_json(console, {"sweep": sweep.name, "points": data})
@@ -103,7 +94,7 @@ def plan_sweep(
 def planned(planners: Sequence[Planner]) -> Planned:
     """The stages of each recipe for the current store; a stage that several recipes share runs once."""
     makers: dict[str, str] = {}
-    found: dict[str, list[PlannedStage]] = {}
+    found: dict[str, list[StagePlan]] = {}
     for planner in planners:
         name = planner.loaded.recipe.name
         if name in found:  # an origin of its own, with other values
@@ -113,7 +104,7 @@ def planned(planners: Sequence[Planner]) -> Planned:
         for step in planner.plan():
             identity = identities[step.stage.name] = step.key or _identity(planner, step.stage, identities)
             maker = name if step.cached else makers.setdefault(identity, name)
-            own.append(PlannedStage(step, "" if maker == name else maker))
+            own.append(replace(step, shared_with="" if maker == name else maker))
     return found
 
 
@@ -133,13 +124,13 @@ def _print_several(request: Request, planners: Sequence[Planner], console: Conso
     """Print a row for each recipe, a legend, the total, and a command that gives reasons."""
     found = planned(planners)
     console.print(plan_table(found, "recipe"))
-    steps = [stage.step for own in found.values() for stage in own if not stage.shared_with]
+    steps = [step for own in found.values() for step in own if not step.shared_with]
     rates = sorted({step.rate_of for step in steps if not step.cached and step.roughly is not None})
     if rates:
         console.print(f"~ at the rate of {', '.join(rates)}, from which it differs", highlight=False)
     console.print(in_all(found, "recipes"), highlight=False, soft_wrap=True)
     rows = zip(found.items(), planners, strict=False)
-    changing = [(name, one.loaded) for (name, own), one in rows if not all(stage.step.cached for stage in own)]
+    changing = [(name, one.loaded) for (name, own), one in rows if not all(step.cached for step in own)]
     if changing:
         *others, (_, last) = changing
         also = f"; so for {', '.join(name for name, _ in others)}" if others else ""
@@ -149,10 +140,10 @@ def _print_several(request: Request, planners: Sequence[Planner], console: Conso
 
 def in_all(found: Planned, what: str = "points") -> str:
     """Total work in a sentence; `what`: noun for the recipes."""
-    stages = [stage for own in found.values() for stage in own]
-    made = [stage.step for stage in stages if not stage.step.cached and not stage.shared_with]
-    shared = sum(bool(stage.shared_with) for stage in stages)
-    cached = sum(stage.step.cached for stage in stages)
+    steps = [step for own in found.values() for step in own]
+    made = [step for step in steps if not step.cached and not step.shared_with]
+    shared = sum(bool(step.shared_with) for step in steps)
+    cached = sum(step.cached for step in steps)
     if not made:
         return f"{len(found)} {what}: all stages are cached"
     counts = f"{len(made)} stages would run, {shared} are shared, {cached} cached"
@@ -177,21 +168,21 @@ def plan_table(found: Planned, what: str) -> Table:
 
     A stage that would run has the time that it takes, without a word, so that six stages fit on 80 characters.
     """
-    names = list(dict.fromkeys(stage.step.stage.name for own in found.values() for stage in own))
+    names = list(dict.fromkeys(step.stage.name for own in found.values() for step in own))
     table = plain_table(what, *names)
     for recipe, own in found.items():
-        cells = {stage.step.stage.name: _cell(stage) for stage in own}
+        cells = {step.stage.name: _cell(step) for step in own}
         table.add_row(recipe, *(cells.get(name, "") for name in names))
     return table
 
 
-def _cell(stage: PlannedStage) -> Text:
-    if stage.step.cached:
-        return Text("published" if stage.step.published else "cached", style="cyan")
-    if stage.shared_with:
+def _cell(step: StagePlan) -> Text:
+    if step.cached:
+        return Text("published" if step.published else "cached", style="cyan")
+    if step.shared_with:
         return Text("shared", style="dim")
-    sign = "~" if stage.step.expected is None and stage.step.roughly is not None else ""
-    return Text(f"{sign}{duration(stage.step.guess)}" or "run", style="bold yellow")
+    sign = "~" if step.expected is None and step.roughly is not None else ""
+    return Text(f"{sign}{duration(step.guess)}" or "run", style="bold yellow")
 
 
 def _print(steps: Sequence[StagePlan], console: Console) -> None:

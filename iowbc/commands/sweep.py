@@ -118,7 +118,7 @@ def run_sweep(
                 said.print(cluster.text, highlight=False)
             record_sweep(found, folder)
             jobs, workers = _shared_out(planners, jobs, cluster)
-            if execution.track and not all(stage.step.cached for own in before.values() for stage in own):
+            if execution.track and not all(step.cached for own in before.values() for step in own):
                 record = sweep_record(runs, found, execution)
                 record.send()
             origin = None if record is None else record.origin

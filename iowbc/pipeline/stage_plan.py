@@ -48,6 +48,8 @@ class StagePlan:
     code: Mapping[str, str] = field(default_factory=dict)
     predecessor: Artifact | None = None
     """The stored artifact that it would go on from."""
+    shared_with: str = ""
+    """Of one recipe among several: the earlier one that makes it; empty where this one does, or where it is cached."""
 
     @property
     def cached(self) -> bool:

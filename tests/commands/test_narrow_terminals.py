@@ -18,7 +18,7 @@ from iowbc.commands.compare import compare
 from iowbc.commands.diff import diff
 from iowbc.commands.listing import ls, show, status
 from iowbc.commands.lookup import named
-from iowbc.commands.plan import PlannedStage, plan_table
+from iowbc.commands.plan import plan_table
 from iowbc.commands.printed import hanging
 from iowbc.pipeline.console.wording import figure
 from iowbc.pipeline.stage import Stage
@@ -199,7 +199,7 @@ def test_a_plan_of_several_recipes_keeps_names_and_times_whole(what: str, name: 
         for stage, seconds in zip(stages, times, strict=True)
     ]
     written = io.StringIO()
-    table = plan_table({name: [PlannedStage(step, "") for step in steps]}, what)
+    table = plan_table({name: steps}, what)
     Console(file=written, width=WIDTH).print(table)
     head, *rows = written.getvalue().splitlines()
     assert all(len(line) <= WIDTH for line in (head, *rows))
