@@ -16,7 +16,7 @@ from iowbc.pipeline.console.wording import short
 from iowbc.pipeline.planner import Planner
 from iowbc.pipeline.stage import Job, Stage
 from iowbc.pipeline.stage_plan import StagePlan
-from iowbc.pipeline.store.artifact import Artifact, read_artifact, seal
+from iowbc.pipeline.store.artifact import Artifact, describe, read_artifact, seal
 from iowbc.pipeline.store.last_used import remember
 from iowbc.pipeline.store.locks import key_lock
 from iowbc.pipeline.store.workspace import Workspace
@@ -40,7 +40,7 @@ class StageReport:
             return
         name = self.view.metric if self.view.metric in values else next(iter(values))
         self.view.measured(name, step, float(values[name]))
-        self.workspace.drawn(self.view.metric, self.view.curve)
+        self.workspace.state.metric = self.view.metric
         if self.tracker is not None:
             self.tracker.metrics(self.view.name, values, step)
         self.display.moved(self.view)
@@ -103,7 +103,7 @@ class Runner:
             self.display.end()
         return self.artifacts
 
-    def _artifact(self, stage: Stage, *, whole: bool = False) -> Artifact:
+    def _artifact(self, stage: Stage, *, whole: bool) -> Artifact:
         """The stage's artifact: the stored one where it can be used, else a new one.
 
         whole: a published one does not do that leaves out large files.
@@ -173,8 +173,8 @@ class Runner:
         ingredients, resolved = step.ingredients, as_yaml(self.loaded.recipe)
         forced = stage.name in self.options.force
         earlier = workspace.begin(self.loaded.recipe.name, forced, dict(step.code), self.command())
-        workspace.describe(ingredients, resolved)
-        view.metric, view.curve = workspace.state.metric, [*workspace.state.curve]
+        describe(workspace.root, ingredients, resolved)
+        view.metric, view.curve = workspace.state.metric, workspace.state.curve
         view.done, view.total = workspace.state.done, workspace.state.total
         view.began = time.monotonic() - workspace.seconds
         self._show(stage, "runs", short(step.notes or step.reasons, 1))

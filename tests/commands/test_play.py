@@ -21,6 +21,7 @@ from iowbc.commands.printed import film_progress
 from iowbc.errors import UsageError
 from iowbc.evaluation.play import requested_episode
 from iowbc.evaluation.play_request import PlayRequest
+from iowbc.pipeline.store.artifact import describe
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.store.workspace import Workspace
@@ -43,7 +44,7 @@ def test_an_unfinished_training_is_told_and_played_from_its_checkpoint(folder: P
     checkpoint = workspace.scratch / "training.checkpoint"
     checkpoint.write_bytes(b"")
     os.utime(checkpoint, 2 * (time.time() - 3600,))
-    workspace.describe({"inputs": {}}, "name: first\n")
+    describe(workspace.root, {"inputs": {}}, "name: first\n")
     playable = in_training(store, "first", "teacher")
     assert playable is not None
     assert playable.recipe == {"name": "first"}

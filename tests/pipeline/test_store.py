@@ -164,7 +164,7 @@ def test_no_flipped_bit_of_a_progress_stops_a_plan(workplace: Workplace) -> None
     stage = "rg-dataset"
     workspace = Workspace(workplace.store.runs, stage, workplace.plan()[stage].key)
     workspace.begin("small", True, {"pipeline": "1a2b"}, "iowbc run small.yaml")
-    workspace.drawn("count", [(1.0, 2.5), (2.0, 3.5)])
+    workspace.state.metric, workspace.state.curve = "count", [(1.0, 2.5), (2.0, 3.5)]
     workspace.progress(3, 9, "counts")
     workspace.write()
     path = workspace.root / PROGRESS

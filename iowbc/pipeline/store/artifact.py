@@ -138,8 +138,7 @@ def seal(
     if lacking:
         raise ValueError(f"{out} has none of the results that the stage declares: {', '.join(lacking)}")
     deciding = tuple(name for name in files if any(fnmatchcase(name, pattern) for pattern in results))
-    write_whole(out / INGREDIENTS, json.dumps(ingredients, indent=1, sort_keys=True))
-    write_whole(out / RECIPE, recipe)
+    describe(out, ingredients, recipe)
     for name in files:
         synchronise(out / name)
     manifest = Manifest(
@@ -151,6 +150,12 @@ def seal(
         made=time.time(),
     )
     write_manifest(out, manifest)
+
+
+def describe(folder: Path, ingredients: Mapping[str, Any], recipe: str) -> None:
+    """Write the files beside a stage's own: the ingredients of the key, and the recipe."""
+    write_whole(folder / INGREDIENTS, json.dumps(ingredients, indent=1, sort_keys=True))
+    write_whole(folder / RECIPE, recipe)
 
 
 def write_manifest(folder: Path, manifest: Manifest) -> None:

@@ -1,18 +1,13 @@
 """The folder of a stage that is being made: scratch, output, and how far it is."""
 
-import json
-import os
 import shutil
 import time
-from collections.abc import Mapping, Sequence
 from pathlib import Path
-from socket import gethostname
-from typing import Annotated, Any
+from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from iowbc.files import write_whole
-from iowbc.pipeline.store.artifact import INGREDIENTS, RECIPE
 from iowbc.pipeline.store.runs import Runs
 
 PROGRESS = "progress.json"
@@ -28,10 +23,7 @@ class Progress(BaseModel):
     model_config = ConfigDict(ser_json_inf_nan="constants")
 
     stage: str = "?"
-    key: str = ""
     recipe: str = "?"
-    pid: int = 0
-    host: str = ""
     forced: bool = False
     attempts: int = Field(default=0, strict=True, ge=0, lt=10**9)
     before: Number = 0.0
@@ -45,7 +37,7 @@ class Progress(BaseModel):
     note: str = ""
     metric: str = ""
     curve: list[tuple[Number, float]] = Field(default_factory=list)
-    """Steps and values of the small curve, named `metric`, over all attempts."""
+    """Steps and values of the small curve, named `metric`, over all attempts; a resumed run continues it."""
     code: dict[str, str] = Field(default_factory=dict)
     command: str = ""
     """Command that resumes it."""
@@ -65,7 +57,7 @@ class Workspace:
         self.root = runs.work / key
         self.scratch = self.root / "scratch"
         self.out = self.root / "out"
-        self.state = Progress(stage=stage, key=key)
+        self.state = Progress(stage=stage)
         """Record of the current attempt."""
         self._begun = self._written = 0.0
 
@@ -82,16 +74,11 @@ class Workspace:
         self.scratch.mkdir(parents=True, exist_ok=True)
         self.out.mkdir()
         self._begun, former = time.monotonic(), earlier or Progress()
-        own = {"stage": self.stage, "key": self.key, "recipe": recipe, "pid": os.getpid(), "host": gethostname()}
+        own = {"stage": self.stage, "recipe": recipe, "code": code, "command": command}
         counted = {"attempts": former.attempts + 1, "before": former.seconds, "forced": forced or former.forced}
-        self.state = former.model_copy(update={**own, **counted, "code": code, "command": command})
+        self.state = former.model_copy(update=own | counted)
         self.write()
         return earlier
-
-    def describe(self, ingredients: Mapping[str, Any], recipe: str) -> None:
-        """Write the ingredients of the key and the recipe, as they will be in the artifact."""
-        write_whole(self.root / INGREDIENTS, json.dumps(ingredients, indent=1, sort_keys=True))
-        write_whole(self.root / RECIPE, recipe)
 
     @property
     def seconds(self) -> float:
@@ -103,10 +90,6 @@ class Workspace:
         self.state.done, self.state.total, self.state.note = done, total, note
         if time.monotonic() - self._written > WRITE_INTERVAL:
             self.write()
-
-    def drawn(self, metric: str, curve: Sequence[tuple[float, float]]) -> None:
-        """Set the metric's curve for the next write; a resumed run continues it."""
-        self.state.metric, self.state.curve = metric, list(curve)
 
     def write(self) -> None:
         """Record the progress on disk."""
