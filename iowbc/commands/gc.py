@@ -3,6 +3,7 @@
 import shutil
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import closing
 from pathlib import Path
 from secrets import token_hex
 from typing import Annotated, Any
@@ -111,7 +112,7 @@ def _to_remove(
         yield from (folder for folder, _ in unfinished(runs) if not holder(runs, folder.name))
         yield from runs.work.glob(f"{REMOVING}*")
         for path in runs.tracking.glob("*.jsonl"):
-            with Journal(path) as journal:
+            with closing(Journal(path)) as journal:
                 if journal.acquire() and not unsent(path):
                     yield from (one for one in (path, sent_path(path)) if one.exists())
     if damaged:

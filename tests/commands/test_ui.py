@@ -9,7 +9,7 @@ import time
 import urllib.error
 import urllib.request
 from collections.abc import Mapping
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import Any
 
@@ -56,7 +56,7 @@ def recorded(runs: Runs, environment: Mapping[str, str]) -> None:
     """A run with a file and a description, as MLflow has it."""
     (runs.root / "store" / "eval").mkdir(parents=True)
     (runs.root / "store" / "eval" / "table.md").write_text("a table")
-    with Journal(runs.tracking / "made-up.jsonl") as journal:
+    with closing(Journal(runs.tracking / "made-up.jsonl")) as journal:
         journal.acquire()
         journal.write("journal", uri="", experiment="iowbc", recipe="box", digest="")
         journal.write("run", id="recipe", parent=None, name="box", tags={DESCRIPTION: "| a |"}, params={})

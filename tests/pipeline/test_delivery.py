@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterator, Mapping
+from contextlib import closing
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -68,7 +69,7 @@ class Server:
 def told(runs: Runs) -> Path:
     """A journal of a finished run with one stage."""
     path = runs.tracking / "one.jsonl"
-    with Journal(path) as journal:
+    with closing(Journal(path)) as journal:
         assert journal.acquire()
         journal.write("journal", uri="sqlite://", experiment="tried", recipe="small", digest="")
         journal.write("run", id="recipe", parent=None, name="small", tags={}, params={"seed": "3"})
@@ -116,7 +117,7 @@ def test_a_run_may_belong_to_one_of_another_journal_whichever_is_sent_first(
 ) -> None:
     runs, server = Runs(tmp_path), Server()
     for stem, parent in (("above", None), ("below", "above/recipe")):
-        with Journal(runs.tracking / f"{stem}.jsonl") as journal:
+        with closing(Journal(runs.tracking / f"{stem}.jsonl")) as journal:
             assert journal.acquire()
             journal.write("journal", uri="sqlite://", experiment="tried", recipe=stem, digest="")
             journal.write("run", id="recipe", parent=parent, name=stem, tags={"told": stem}, params={"is": stem})
@@ -171,7 +172,7 @@ def test_a_damaged_journal_stops_no_run_and_no_other_journal(
 
 
 def test_a_line_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
-    with Journal(tmp_path / "journal.jsonl") as journal:
+    with closing(Journal(tmp_path / "journal.jsonl")) as journal:
         journal.write("end", id="recipe", status="FINISHED")
         whole = journal.path.read_bytes()
 

@@ -6,6 +6,7 @@ import signal
 import sqlite3
 import subprocess
 import sys
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -143,7 +144,7 @@ def test_a_server_that_is_away_stops_nothing_and_hears_everything_later(workplac
 
 def test_the_journal_of_a_dead_process_is_closed_as_killed(tmp_path: Path) -> None:
     path = tmp_path / "journal.jsonl"
-    with Journal(path) as journal:
+    with closing(Journal(path)) as journal:
         assert journal.acquire()
         journal.write("run", id="recipe", parent=None)
         journal.write("run", id="teacher", parent="recipe")

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from socket import gethostname
+from typing import IO, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -41,11 +42,16 @@ def holder(runs: Runs, key: str) -> Holder | None:
     if not path.exists():
         return None
     with path.open("rb") as file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        except BlockingIOError:
-            return _read(path)
-    return None
+        return None if taken(file, fcntl.LOCK_SH) else _read(path)
+
+
+def taken(file: IO[Any], operation: int = fcntl.LOCK_EX) -> bool:
+    """Take the lock of an open file; False where another process holds it."""
+    try:
+        fcntl.flock(file, operation | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True
 
 
 @contextmanager
@@ -59,18 +65,14 @@ def key_lock(
     runs.locks.mkdir(parents=True, exist_ok=True)
     with lock_path(runs, key).open("a+") as file:
         reported = False
-        while True:
-            try:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                break
-            except BlockingIOError:
-                if interrupted():
-                    yield False
-                    return
-                if not reported:
-                    on_wait(_read(lock_path(runs, key)))
-                    reported = True
-                time.sleep(POLL)
+        while not taken(file):
+            if interrupted():
+                yield False
+                return
+            if not reported:
+                on_wait(_read(lock_path(runs, key)))
+                reported = True
+            time.sleep(POLL)
         file.seek(0)
         file.truncate()
         file.write(Holder(pid=os.getpid(), host=gethostname()).model_dump_json())

@@ -7,7 +7,6 @@ process.
 """
 
 import contextlib
-import fcntl
 import json
 import os
 import re
@@ -15,10 +14,11 @@ import time
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 from iowbc.errors import Damaged
 from iowbc.files import read_checked, write_checked
+from iowbc.pipeline.store.locks import taken
 
 PARENT = "recipe"
 """Identifier of the parent run within a journal; a nested run has its stage's name."""
@@ -40,14 +40,10 @@ class Journal:
         A last line that a dying process left half written is cut off.
         """
         limit = time.monotonic() + patience
-        while True:
-            try:
-                fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                break
-            except BlockingIOError:
-                if time.monotonic() >= limit:
-                    return False
-                time.sleep(0.01)
+        while not taken(self._file):
+            if time.monotonic() >= limit:
+                return False
+            time.sleep(0.01)
         written = self.path.read_bytes()
         if not written.endswith(b"\n"):
             os.truncate(self.path, written.rfind(b"\n") + 1)
@@ -68,12 +64,6 @@ class Journal:
 
     def close(self) -> None:
         self._file.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *reason: object) -> None:
-        self.close()
 
 
 def lines(path: Path, offset: int = 0) -> Iterator[tuple[dict[str, Any] | None, int]]:
@@ -117,7 +107,7 @@ def header(path: Path) -> dict[str, Any]:
 
 def close_orphaned(path: Path) -> bool:
     """End the runs of a journal whose process died as KILLED. False while the process lives."""
-    with Journal(path) as journal:
+    with contextlib.closing(Journal(path)) as journal:
         if not journal.acquire():
             return False
         for run, status in reversed(statuses(path).items()):
