@@ -9,7 +9,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -147,7 +147,7 @@ def drive(
     turns = 0
     begin: float | None = None
     leaving: float | None = None
-    with Teller(tell) as teller, _damping_after_errors(bus, machine):
+    with contextlib.closing(Teller(tell)) as teller, _damping_after_errors(bus, machine):
         kept = np.full((2, KEPT_TIMES), np.nan, np.float32)  # allocated in advance
         while True:
             now, states = clock.turn(bus)
@@ -208,9 +208,6 @@ class Teller:
             while (line := self._lines.get()) is not None:
                 self._tell(line)
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *exception: object) -> None:
+    def close(self) -> None:
         self._lines.put(None)
         self._thread.join(FINAL_DAMPING)
