@@ -1,7 +1,5 @@
 """Displays of a run: the state of each stage, and plain lines for logs."""
 
-import os
-import sys
 import time
 from collections import deque
 from collections.abc import Sequence
@@ -108,10 +106,9 @@ class Display:
 class PlainDisplay(Display):
     """Lines for logs: each change of state, and progress once in a while."""
 
-    def __init__(self, interval: float, stream: IO[str] | None = None) -> None:
+    def __init__(self, interval: float, stream: IO[str]) -> None:
         """interval: seconds between two lines of progress."""
-        self.interval = interval
-        self.stream = stream or sys.stdout
+        self.interval, self.stream = interval, stream
         self._last = time.monotonic()
 
     def changed(self, view: StageView) -> None:
@@ -134,8 +131,4 @@ class PlainDisplay(Display):
         self.say("  ".join([*parts, view.note] if view.note else parts))
 
     def say(self, text: str) -> None:
-        """Print one line; a closed pipe (`| head`) does not stop the run."""
-        try:
-            print(text, file=self.stream, flush=True)
-        except BrokenPipeError:
-            os.dup2(os.open(os.devnull, os.O_WRONLY), self.stream.fileno())
+        print(text, file=self.stream, flush=True)
