@@ -47,28 +47,25 @@ def remember(runs: Runs, loaded: LoadedRecipe, artifact: Artifact) -> None:
     A recipe's name stands for its artifacts without overrides. A run with overrides only adds to `ever`, unless nothing
     else goes by that name; its stages are never mixed with those of other overrides.
     """
-    with named_lock(lock_path(runs, f"recipe-{loaded.recipe.name}")):
-        _remember(runs, loaded, artifact)
-
-
-def _remember(runs: Runs, loaded: LoadedRecipe, artifact: Artifact) -> None:
     stage, key, name = artifact.manifest.stage, artifact.manifest.key, loaded.recipe.name
-    record = _record(runs, name)
-    if record is None:
-        record = LastUsed(ever=_made(runs, name) if record_path(runs, name).exists() else {})
-    if not loaded.overrides or record.overrides or not (record.recipe or _published(runs, name)):
-        if record.overrides != list(loaded.overrides):
-            for other in record.stages:
-                (runs.root / name / other).unlink(missing_ok=True)
-            record.stages = {}
-        record.file, record.overrides = str(loaded.file), list(loaded.overrides)
-        record.recipe = loaded.recipe.model_dump(mode="json")
-        record.stages[stage] = Use(key=key, time=time.time())
-        _link(runs, name, stage, artifact.folder)
-    elif stage not in record.stages or record.stages[stage].key != key:
-        _link(runs, name, _with_key(stage, artifact.folder), artifact.folder)
-    record.ever[key] = time.time()
-    write_whole(record_path(runs, name), record.model_dump_json(indent=1))
+    with named_lock(lock_path(runs, f"recipe-{name}")):
+        record = _record(runs, name)
+        if record is None:  # where it is damaged, what it made counts as used now
+            made = _keys(runs.store, name) if record_path(runs, name).exists() else []
+            record = LastUsed(ever=dict.fromkeys(made, time.time()))
+        if not loaded.overrides or record.overrides or not (record.recipe or _keys(runs.published, name)):
+            if record.overrides != list(loaded.overrides):
+                for other in record.stages:
+                    (runs.root / name / other).unlink(missing_ok=True)
+                record.stages = {}
+            record.file, record.overrides = str(loaded.file), list(loaded.overrides)
+            record.recipe = loaded.recipe.model_dump(mode="json")
+            record.stages[stage] = Use(key=key, time=time.time())
+            _link(runs, name, stage, artifact.folder)
+        elif stage not in record.stages or record.stages[stage].key != key:
+            _link(runs, name, _with_key(stage, artifact.folder), artifact.folder)
+        record.ever[key] = time.time()
+        write_whole(record_path(runs, name), record.model_dump_json(indent=1))
 
 
 def ever_used(runs: Runs, recipe: str) -> dict[str, float]:
@@ -166,12 +163,6 @@ def _record(runs: Runs, recipe: str) -> LastUsed | None:
         return None
 
 
-def _made(runs: Runs, recipe: str) -> dict[str, float]:
-    """Keys of the artifacts that a recipe made, for a record that is damaged, with the present time [s since 1970]."""
-    made = [file.parent.name for file in runs.store.glob(f"*/*/{MANIFEST}") if read_json(file).get("recipe") == recipe]
-    return dict.fromkeys(made, time.time())
-
-
-def _published(runs: Runs, recipe: str) -> bool:
-    """True if artifacts of a recipe came with the repository."""
-    return any(read_json(file).get("recipe") == recipe for file in runs.published.glob(f"*/*/{MANIFEST}"))
+def _keys(folder: Path, recipe: str) -> list[str]:
+    """Keys of the artifacts in `store` or `published` that a recipe made."""
+    return [file.parent.name for file in folder.glob(f"*/*/{MANIFEST}") if read_json(file).get("recipe") == recipe]
