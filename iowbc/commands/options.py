@@ -107,7 +107,12 @@ Named = Annotated[
 
 
 def page_port(web: bool, port: int | None) -> int | None:
-    """The port of a page; None where there is to be none. Raises UsageError for a port without a page."""
+    """The free port of a page; None where there is to be none. Raises UsageError for a port without a page, and where
+    a page cannot be served."""
     if port is not None and not web:
         raise UsageError("--port is that of the page that --web serves; give both")
-    return port or PORT if web else None
+    if not web:
+        return None
+    require_extra("web", "--web")
+    require_free(port or PORT)
+    return port or PORT

@@ -63,7 +63,7 @@ def play(
     runs: options.RunsFolder = options.RUNS,
 ) -> None:
     """Play an episode of what a word names, in the viewer, in the browser or as a film. Raises `UsageError`."""
-    page, store, console = options.page_port(web, port), Store(Runs(runs)), stdout_console()
+    store, console = Store(Runs(runs)), stdout_console()
     request = PlayRequest(
         scene=scene,
         mass=PlayRequest.mass if mass is None else mass,
@@ -72,12 +72,10 @@ def play(
         disturbances=disturbances,
         video=video,
     )
-    if page is not None and video is not None:
+    if web and video is not None:
         raise UsageError("--web and --video exclude each other: open the page, or make a film")
     options.require_extra("train", "iowbc play")
-    if page is not None:
-        options.require_extra("web", "--web")
-        options.require_free(page)
+    page = options.page_port(web, port)
     close_on_termination()
     plan = planned(store, word)
     skill = skill_to_play(store, word, stage, plan)

@@ -159,12 +159,9 @@ def robot_sim(
     port: options.Port = None,
 ) -> None:
     """Simulate a robot on the bus until it is stopped."""
-    page = options.page_port(web, port)
     options.require_extra("robot", "iowbc robot-sim")
     options.require_extra("train", "iowbc robot-sim")
-    if page is not None:
-        options.require_extra("web", "--web")
-        options.require_free(page)
+    page = options.page_port(web, port)
     from iowbc.evaluation.exported import exported_world
     from iowbc.onboard.dds import DdsBus
     from iowbc.onboard.operators import pose_port

@@ -186,16 +186,13 @@ class Machine:
             return f"the pelvis leans by {now.tilt:.2f} rad, more than {limits.standing_tilt:g}"
         if wanted is State.STAND and (speed := np.abs(now.velocity).max()) > limits.standing_speed:
             return f"a joint moves at {speed:.1f} rad/s, more than {limits.standing_speed:g}"
-        if wanted is State.STAND:
-            return self._stale_input(given, pose=False)
         if wanted is State.RUN:
             if given.now - self._entered < limits.ramp:
                 return "the standing posture is not reached yet"
             error = np.abs(now.position - self._goal)
             if error[worst := int(np.argmax(error))] > limits.standing_error:
                 return f"{self._contract.joints[worst]} is {error[worst]:.2f} rad from the standing posture"
-            return self._stale_input(given, pose=True)
-        return None
+        return self._stale_input(given, pose=wanted is State.RUN)
 
     def _stale_input(self, given: CycleInputs, *, pose: bool) -> str | None:
         """Reason if the newest command is stale, or with `pose` a pose that the policy observes is stale or missing."""

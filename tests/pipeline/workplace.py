@@ -105,7 +105,7 @@ class Workplace:
         for path in (self.folder / "runs" / "work").glob("*/progress.json"):
             record = read_json(path)
             if record and record["stage"] == stage:
-                content = read_checked(path.parent / "scratch" / fake_stages.CHECKPOINT, record["key"])
+                content = read_checked(path.parent / "scratch" / fake_stages.CHECKPOINT, path.parent.name)
                 return {"checkpoint": json.loads(content or b"0"), **record}
         return None
 
