@@ -18,6 +18,8 @@ from iowbc.recipe.reading.loading import load_recipe, recipe_file
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.section import deciding
 from iowbc.results.table import ABSENT, Cell, Column, Table, heads, markdown, measured
+from iowbc.robot.description import robot_folder
+from iowbc.task.specification import Specification
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -119,8 +121,6 @@ def drake_version() -> str | None:
 def _play(recipe: Recipe, workers: int) -> "pd.DataFrame":
     """The trials of a suite with the controller that it names."""
     from iowbc.evaluation.trials.protocol import Protocol, evaluated_policy, evaluated_world
-    from iowbc.robot.description import robot_folder
-    from iowbc.task.specification import Specification
 
     reached = 0
 

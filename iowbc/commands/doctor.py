@@ -21,6 +21,7 @@ from iowbc.pipeline.store.runs import Runs, obstacle
 from iowbc.pipeline.tracking.delivery import tracking_uri
 from iowbc.pipeline.tracking.tracker import backlog
 from iowbc.processes import available_cores
+from iowbc.robot.description import load_robot, robot_folders
 
 Verdict = Literal["good", "doubtful", "bad"]
 STYLES = {"good": "green", "doubtful": "yellow", "bad": "bold red"}
@@ -136,8 +137,6 @@ def _packages() -> Iterator[Finding]:
 
 
 def _robots() -> Iterator[Finding]:
-    from iowbc.robot.description import load_robot, robot_folders
-
     if not (folders := robot_folders()):
         yield Finding("robot", "bad", "no description of any robot is there; install iowbc again")
     for folder in folders.values():

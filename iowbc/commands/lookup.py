@@ -7,7 +7,7 @@ import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pydantic import ValidationError
 
@@ -27,10 +27,9 @@ from iowbc.recipe.recipe import PIPELINE, Recipe
 from iowbc.recipe.section import deciding
 from iowbc.recipe.sweep import Sweep
 from iowbc.report.runs import Run
+from iowbc.robot.description import robot_folder
 from iowbc.stages.registry import STAGES
-
-if TYPE_CHECKING:
-    from iowbc.task.specification import Specification
+from iowbc.task.specification import Specification
 
 SWEEP_RECORD, COMPARISON_RECORD = "sweep.json", "runs.json"
 """Files of a sweep with its points, and of a comparison with its runs."""
@@ -300,10 +299,7 @@ def policy_stages() -> list[str]:
     return [name for name, stage in reversed(STAGES.items()) if stage.leaves_policy]
 
 
-def world_of(resolved: Mapping[str, Any], generator: Artifact | None) -> "Specification":
+def world_of(resolved: Mapping[str, Any], generator: Artifact | None) -> Specification:
     """The world of a resolved recipe; `generator`: the reference generator that its policy was trained on."""
-    from iowbc.robot.description import robot_folder
-    from iowbc.task.specification import Specification
-
     recipe = Recipe.model_validate(resolved)
     return Specification(recipe, robot_folder(recipe.robot), None if generator is None else generator.folder)

@@ -22,12 +22,12 @@ from iowbc.recipe.evaluation.evaluation import Evaluation
 from iowbc.recipe.reading.loading import SUFFIXES, load_recipe
 from iowbc.recipe.recipe import Recipe
 from iowbc.stages.inputs import policy_stage
+from iowbc.task.specification import Specification
 
 if TYPE_CHECKING:
     from iowbc.evaluation.play import Source
     from iowbc.learning.networks import TeacherNetwork
     from iowbc.skill.lower_layer import Student
-    from iowbc.task.specification import Specification
 
 SKILL = "skill"
 

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from iowbc.errors import Problem, RecipeError, UsageError
 from iowbc.pipeline.planner import Planner, Plans, planner_for
@@ -16,10 +15,9 @@ from iowbc.pipeline.store.store import Store
 from iowbc.recipe.reading.loading import LoadedRecipe, load_recipe
 from iowbc.recipe.reading.study import load_study
 from iowbc.recipe.sweep import Sweep, load_sweep
+from iowbc.reference.ranges import wrong_ranges
+from iowbc.robot.description import Robot, load_robot, robot_folder
 from iowbc.stages.registry import STAGES
-
-if TYPE_CHECKING:
-    from iowbc.robot.description import Robot
 
 
 @dataclass(frozen=True)
@@ -70,9 +68,6 @@ def point_planners(asked: Request, file: Path | None, most: int) -> tuple[Sweep,
 
 def prepared(loaded: LoadedRecipe, runs: Runs, options: Options) -> Planner:
     """The planner of a recipe. Raises `RecipeError`, also for what the robot does not have or cannot reach."""
-    from iowbc.reference.ranges import wrong_ranges
-    from iowbc.robot.description import robot_folder
-
     try:
         folder = robot_folder(loaded.recipe.robot)
     except UsageError as error:
@@ -99,8 +94,6 @@ def in_order(planner: Planner) -> list[Planner]:
 
 
 @cache
-def _robot(folder: Path, digest: str) -> "Robot":
+def _robot(folder: Path, digest: str) -> Robot:
     """The robot in a folder, read once while its files stay as they are."""
-    from iowbc.robot.description import load_robot
-
     return load_robot(folder)

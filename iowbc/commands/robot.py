@@ -15,10 +15,13 @@ from iowbc.commands.printed import plain_table, stdout_console, tell
 from iowbc.deploy.controller import Controller
 from iowbc.deploy.exported_folder import exported_folder
 from iowbc.errors import UsageError, require_known
+from iowbc.onboard.checks import CHECKS, LIMITS, CheckResult, checks
+from iowbc.onboard.machine import Machine
+from iowbc.onboard.operators import Keyboard, OperatorWithPoses, Udp, object_poses, operator, pose_port, single_keys
+from iowbc.onboard.ranges import Ranges
 
 if TYPE_CHECKING:
     from iowbc.live.remote_view import RemoteView
-    from iowbc.onboard.checks import CheckResult
     from iowbc.onboard.process import Clock
     from iowbc.twin.robot import Twin
 
@@ -55,13 +58,9 @@ def robot(
 ) -> None:
     """Check the robot and drive it. Raises UsageError where a check fails."""
     options.require_extra("robot", "iowbc robot")
-    from iowbc.onboard.checks import CHECKS, LIMITS, checks
     from iowbc.onboard.dds import DdsBus
     from iowbc.onboard.log import LogWriter, export_digest
-    from iowbc.onboard.machine import Machine
-    from iowbc.onboard.operators import Keyboard, OperatorWithPoses, Udp, object_poses, operator, single_keys
     from iowbc.onboard.process import LockStep, MonotonicClock, drive, enable_realtime, listen
-    from iowbc.onboard.ranges import Ranges
 
     console = stdout_console()
     for name in waive or ():
@@ -124,7 +123,7 @@ def _stop_request() -> threading.Event:
     return stop
 
 
-def report_checks(console: Console, found: "list[CheckResult]", waived: Collection[str]) -> None:
+def report_checks(console: Console, found: list[CheckResult], waived: Collection[str]) -> None:
     """Print the checks. Raises UsageError for failed ones that are not waived, and for those that cannot be."""
     table = plain_table("check", "", "found")
     for check in found:
@@ -164,8 +163,6 @@ def robot_sim(
     page = options.page_port(web, port)
     from iowbc.evaluation.exported import exported_world
     from iowbc.onboard.dds import DdsBus
-    from iowbc.onboard.operators import pose_port
-    from iowbc.onboard.ranges import Ranges
     from iowbc.twin.process import ObjectTracking, serve
     from iowbc.twin.robot import Twin
     from iowbc.twin.support import Support
