@@ -38,7 +38,6 @@ def publish(
     without = without or []
     found = planners(request)
     plans = [planner.plan() for planner in found]
-    steps = [step for plan in plans for step in plan]
     lacking = [
         f"{planner.loaded.recipe.name} ({', '.join(missing)})"
         for planner, plan in zip(found, plans, strict=True)
@@ -47,7 +46,7 @@ def publish(
     if lacking:
         raise UsageError(f"not finished: {', '.join(lacking)}; to finish: {request.command()}")
     require_writable_runs(request.runs)
-    notes = {step.key: step.notes for step in steps}
+    notes = {step.key: step.notes for plan in plans for step in plan}
     chains = [one for planner in found for one in planner.chain()]
     made = [step.artifact for one in chains for step in one.plan()]
     made += [one for each in chains for stage in each.stages for one in each.borrowed(stage).values()]

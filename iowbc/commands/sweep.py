@@ -135,7 +135,8 @@ def run_sweep(
                 endings = run_points(tasks, jobs, stop, board, start)
     except KeyboardInterrupt:
         pass  # recorded in the endings
-    code = _code(endings)
+    states = {ending.state for ending in endings.values()}
+    code = INTERRUPTED if states & {"stopped", "waits"} else STAGE_FAILED if "failed" in states else DONE
     try:
         if code != INTERRUPTED:
             _conclude(found, endings, runs, folder, said, record)
@@ -154,11 +155,6 @@ def _shared_out(planners: Sequence[Planner], jobs: int | None, cluster: "Cluster
     jobs = jobs or (1 if cluster is None else max(1, min(cores // actors, len(planners))))
     most = cores if cluster is None else cluster.largest
     return jobs, max(1, min(most, cores // jobs))
-
-
-def _code(endings: Endings) -> int:
-    states = {ending.state for ending in endings.values()}
-    return INTERRUPTED if states & {"stopped", "waits"} else STAGE_FAILED if "failed" in states else DONE
 
 
 def _conclude(

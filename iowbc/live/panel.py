@@ -115,7 +115,7 @@ class DrivingPanel(ControlPanel):
 
     def _add_tabs(self, tabs: viser.GuiTabGroupHandle) -> None:
         gui, self._recipe = self._gui, self._session.source.world.recipe
-        self._request: PlayRequest = self._session.request
+        self._request = request = self._session.request
         with tabs.add_tab("Command"):
             self._command = self._commands(self._recipe.task.commands)
             gui.add_button("Stand still").on_click(lambda _: self._stand())
@@ -127,7 +127,14 @@ class DrivingPanel(ControlPanel):
             self._button(gui.add_button("Push the object"), "push object")
         with tabs.add_tab("Episode"):
             gui.add_markdown("Every change begins a new episode.")
-            self._conditions()
+            self.scene = gui.add_dropdown("Scene", self._recipe.simulation.scenes.names, initial_value=request.scene)
+            most = max(request.mass, self._heaviest(request.scene))
+            self.mass = gui.add_slider("Mass [kg]", 0.0, most, 0.5, request.mass, hint="0 is without an object")
+            share = request.partner_share or 0.0
+            self.partner_share = gui.add_slider("Partner's share", 0.0, 1.0, 0.05, share, hint="Of the weight")
+            self.seed = gui.add_number("Seed", request.seed, min=0, max=LAST_SEED, step=1)
+            self.disturbances = gui.add_checkbox("Impulses, pushes", request.disturbances, hint="At random times")
+            self.scene.on_update(lambda _: self._suit_mass())
 
     def steer(self) -> None:
         self._session.wanted[:] = [slider.value for slider in self._command]
@@ -173,17 +180,6 @@ class DrivingPanel(ControlPanel):
             for name, reach in zip(COMMAND[5:], np.tile(wrist, 2).tolist(), strict=True):
                 rows.append(self._gui.add_slider(f"{name.replace('_', ' ')} [m]", -reach, reach, 0.005, 0.0))
         return rows
-
-    def _conditions(self) -> None:
-        request, gui = self._request, self._gui
-        self.scene = gui.add_dropdown("Scene", self._recipe.simulation.scenes.names, initial_value=request.scene)
-        most = max(request.mass, self._heaviest(request.scene))
-        self.mass = gui.add_slider("Mass [kg]", 0.0, most, 0.5, request.mass, hint="0 is without an object")
-        share = request.partner_share or 0.0
-        self.partner_share = gui.add_slider("Partner's share", 0.0, 1.0, 0.05, share, hint="Of the weight")
-        self.seed = gui.add_number("Seed", request.seed, min=0, max=LAST_SEED, step=1)
-        self.disturbances = gui.add_checkbox("Impulses, pushes", request.disturbances, hint="At random times")
-        self.scene.on_update(lambda _: self._suit_mass())
 
     def _suit_mass(self) -> None:
         """Adapt the range of the mass to the scene's object."""
