@@ -35,7 +35,6 @@ def artifacts(incomplete: str) -> list[str]:
 
 
 def stages(incomplete: str) -> list[str]:
-    """Names of stages."""
     from iowbc.recipe.recipe import PIPELINE
 
     return _beginning(incomplete, PIPELINE)

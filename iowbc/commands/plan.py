@@ -43,7 +43,6 @@ def plan(
     as_json: options.AsJson = False,
     runs: options.RunsFolder = options.RUNS,
 ) -> None:
-    """Print the plan of a recipe, a study or a sweep."""
     asked = Options(until, frozenset(force or ()), on_code_change=on_code_change)
     request, console = Request(recipe, overrides or (), Runs(runs), asked), stdout_console()
     if as_sweep or file is not None:

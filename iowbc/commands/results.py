@@ -40,7 +40,6 @@ TRIALS, PROBE = "trials.parquet", "probe.parquet"
 
 
 def print_results(runs: Runs, recipe: str, artifacts: Mapping[str, Artifact], console: Console) -> None:
-    """Print the results of a recipe's finished stages."""
     folders = {
         stage: named_folder(runs, recipe, stage, artifact.folder).absolute() for stage, artifact in artifacts.items()
     }

@@ -59,7 +59,6 @@ class Drawing:
     """The scene of a server. `build` it for a model, then `show` its moments."""
 
     def __init__(self, server: viser.ViserServer, robot: Robot, view: View = VIEW) -> None:
-        """`view`: see `VIEW`."""
         server.initial_camera.position, server.initial_camera.look_at = view
         server.gui.configure_theme(show_logo=False, show_share_button=False)
         self._scene, self._robot = server.scene, robot

@@ -155,7 +155,6 @@ class Page:
             self.session.begin(wish)
 
     def _restart_after_end(self, now: float) -> None:
-        """Begins again some time after an episode's end."""
         if not self.session.track.ending:
             self._ended = None
         elif self._ended is None:

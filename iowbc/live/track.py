@@ -68,7 +68,6 @@ class Track:
         return int(np.clip(steps, 0, len(self.moments) - 1))
 
     def readings(self, place: int) -> TrackFigures:
-        """The figures at the moment of an index."""
         first = max(0, place + 1 - round(WINDOW / self.period))
         seen = [self.moments[index] for index in range(first, place + 1)]
         signals = {name: np.stack([moment.signals[name] for moment in seen])[:, None] for name in RECORDED}

@@ -115,7 +115,6 @@ class DdsBus:
         self._writers: dict[Any, DataWriter[Any]] = {}
 
     def publish(self, message: Record) -> None:
-        """Sends a message of any kind."""
         kind = message.dtype
         if kind not in self._writers:
             self._writers[kind] = DataWriter(self._participant, self._topics[kind])

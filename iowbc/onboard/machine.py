@@ -170,7 +170,6 @@ class Machine:
         return found
 
     def _refusal(self, wanted: State, given: CycleInputs) -> str | None:
-        """Reason to refuse a requested state."""
         limits, now = self.limits, self.sensors.posture
         if wanted not in BEFORE:
             return None

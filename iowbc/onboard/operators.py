@@ -205,7 +205,6 @@ class Udp:
         return replace(last, request=request)
 
     def discard(self) -> None:
-        """Drop the datagrams that have arrived."""
         with contextlib.suppress(BlockingIOError):
             for _ in range(BACKLOG):
                 self._socket.recv(LARGEST_DATAGRAM)

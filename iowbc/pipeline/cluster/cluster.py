@@ -70,11 +70,9 @@ class Cluster:
         return NodeSpread({path: self._folder(path) for path in paths}, lambda: False, lambda text: None)
 
     def abort(self) -> None:
-        """Abort all running stages."""
         self.aborted = True
 
     def close(self) -> None:
-        """End all tasks and the connection."""
         ray.shutdown()
 
     def _attempt(self, stage: Stage, job: Job) -> Files | None:
@@ -141,7 +139,6 @@ class Cluster:
 
 
 def _pass_on(job: Job, event: Event) -> None:
-    """Apply a task's event to the job."""
     kind, *rest = event
     if kind == "files":
         write_files(job.work, rest[0])

@@ -37,7 +37,6 @@ class SharedFolder:
 
 
 def files_of(folder: Path) -> dict[str, bytes]:
-    """The files below a folder."""
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder_files(folder)}
 
 

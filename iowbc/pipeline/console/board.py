@@ -45,7 +45,6 @@ class Board:
         """The live table; a context manager to hold during the runs."""
 
     def began(self, name: str) -> None:
-        """A run begins."""
         view = self.views[name]
         view.state, view.began = "runs", time.monotonic()
         self._say(f"{name}: runs, log {self.logs[name]}")

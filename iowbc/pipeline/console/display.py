@@ -55,7 +55,6 @@ class StageView:
 
     @property
     def values(self) -> list[float]:
-        """The main metric's values."""
         return [value for _, value in self.curve]
 
     @property
@@ -117,7 +116,6 @@ class PlainDisplay(Display):
         self._last = time.monotonic()
 
     def moved(self, view: StageView) -> None:
-        """A stage made progress: shown once in an interval."""
         if time.monotonic() - self._last < self.interval:
             return
         self._last = time.monotonic()

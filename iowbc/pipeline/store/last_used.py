@@ -83,7 +83,6 @@ def recall(runs: Runs, recipe: str) -> LastUsed:
 
 
 def record_path(runs: Runs, recipe: str) -> Path:
-    """Path of the record of a recipe."""
     return runs.recipes / f"{recipe}.json"
 
 
@@ -109,7 +108,6 @@ def require_results(runs: Runs, artifact: Artifact) -> None:
 
 
 def _again(runs: Runs, artifact: Artifact, *options: str) -> str:
-    """Command that makes an artifact again."""
     made, words = artifact.manifest, ["iowbc", "run", str(artifact.folder / RECIPE)]
     record = _record(runs, made.recipe)
     if record is not None and made.stage in record.stages and record.stages[made.stage].key == made.key:
@@ -125,7 +123,6 @@ def named_folder(runs: Runs, recipe: str, stage: str, artifact: Path) -> Path:
 
 
 def remove_dangling(runs: Runs) -> None:
-    """Remove links to deleted artifacts."""
     for folder in runs.root.iterdir() if runs.root.is_dir() else ():
         if folder.is_dir() and folder not in runs.parts and _only_links(folder):
             for path in folder.iterdir():

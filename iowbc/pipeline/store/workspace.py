@@ -92,7 +92,6 @@ class Workspace:
             self.write()
 
     def write(self) -> None:
-        """Record the progress on disk."""
         self._written = time.monotonic()
         self.state.seconds, self.state.updated = self.seconds, time.time()
         write_whole(self.root / PROGRESS, self.state.model_dump_json())
@@ -103,7 +102,6 @@ class Workspace:
         return self.root.is_dir() and not self.out.is_dir()
 
     def remove(self) -> None:
-        """Remove scratch, checkpoints and leftovers."""
         shutil.rmtree(self.root, ignore_errors=True)
 
 
