@@ -5,7 +5,6 @@ import json
 import os
 import shutil
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +13,10 @@ from pydantic import ValidationError
 from iowbc.deploy.exported_folder import SHORTEST_PREFIX
 from iowbc.errors import UsageError, nearest
 from iowbc.files import write_whole
-from iowbc.pipeline.console.wording import ago
-from iowbc.pipeline.store.artifact import INGREDIENTS, RECIPE, Artifact
+from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.last_used import LastUsed, recall, require_results
-from iowbc.pipeline.store.locks import holder
-from iowbc.pipeline.store.runs import Runs, read_json, read_yaml
+from iowbc.pipeline.store.runs import Runs, read_json
 from iowbc.pipeline.store.store import Store
-from iowbc.pipeline.store.workspace import unfinished
 from iowbc.recipe.reading.loading import SUFFIXES, load_recipe, recipe_file
 from iowbc.recipe.reading.study import load_study
 from iowbc.recipe.recipe import PIPELINE, Recipe
@@ -39,9 +35,6 @@ FILM = "side_by_side.mp4"
 """Film of one trial of a comparison."""
 COMPARED = ("tables", "figures")
 """Folders of a comparison."""
-PLAYED = "teacher"
-"""The stage whose checkpoint can be played."""
-CHECKPOINT = Path("scratch", "training.checkpoint")
 
 
 def named(store: Store, word: str) -> Run:
@@ -50,9 +43,9 @@ def named(store: Store, word: str) -> Run:
     if word not in recipes:
         require_no_study(word)
     if word in recipes or Path(word).suffix in SUFFIXES:
-        return _recipe(store, word, _name_in(word), published)
+        return _recipe(store, word, name_in(word), published)
     head, slash, stage = word.rpartition("/")
-    if slash and (name := _name_in(head)) in recipes:
+    if slash and (name := name_in(head)) in recipes:
         found = _recipe(store, word, name, published).usable
         if stage not in found:
             stages = ", ".join(found) or "none"
@@ -125,7 +118,7 @@ def _continues(artifact: Artifact, key_values: Mapping[str, Any], used: Mapping[
     return read.items() >= inputs.items() and (known.get("version"), known.get("recipe")) == (version, key_values)
 
 
-def _name_in(word: str) -> str:
+def name_in(word: str) -> str:
     """The name that a recipe file gives, else that of the file; any other word as it is."""
     if Path(word).suffix not in SUFFIXES:
         return word
@@ -224,46 +217,6 @@ def film_of(runs: Runs, words: Sequence[str]) -> Path | None:
         if film.is_file() and sorted(_recorded(film.with_name(COMPARISON_RECORD), "runs")) == sorted(words):
             return film
     return None
-
-
-@dataclass(frozen=True)
-class UnfinishedTraining:
-    """A training that is not finished."""
-
-    stage: str
-    key: str
-    text: str
-    """Message about its state."""
-    checkpoint: Path
-    ingredients: Mapping[str, Any]
-    """The ingredients of its key."""
-    recipe: Mapping[str, Any] | None
-    """The resolved recipe; None where the checkpoint cannot be played."""
-
-
-def in_training(store: Store, word: str, stage: str | None) -> UnfinishedTraining | None:
-    """The newest unfinished training that `RECIPE/STAGE`, or a recipe and `--stage`, names, if there is one."""
-    name, slash, last = word.rpartition("/")
-    name, wanted = (name, last) if slash and Path(word).suffix not in SUFFIXES else (word, stage)
-    if wanted not in STAGES or not STAGES[wanted].trained_by:
-        return None
-    own = [one for one in unfinished(store.runs) if (one[1].stage, one[1].recipe) == (wanted, _name_in(name))]
-    if not own:
-        return None
-    folder, record = own[0]
-    checkpoint, ingredients, recipe = folder / CHECKPOINT, read_json(folder / INGREDIENTS), read_yaml(folder / RECIPE)
-    state = "is being trained" if holder(store.runs, folder.name) else "was interrupted"
-    share = f", {record.share} done" if record.share else ""
-    playable = record.stage == PLAYED and checkpoint.is_file() and bool(recipe and ingredients)
-    then = f"; this is its checkpoint of {ago(checkpoint.stat().st_mtime)}" if playable else ""
-    return UnfinishedTraining(
-        stage=record.stage,
-        key=folder.name,
-        text=f"{record.stage} of {record.recipe} {state}{share}{then}",
-        checkpoint=checkpoint,
-        ingredients=ingredients,
-        recipe=recipe if playable else None,
-    )
 
 
 def input_of(store: Store, artifact: Artifact, stage: str) -> Artifact | None:

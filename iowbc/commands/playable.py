@@ -9,19 +9,24 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 
-from iowbc.commands.lookup import in_training, input_artifact, input_of, named, policy_stages, world_of
+from iowbc.commands.lookup import input_artifact, input_of, name_in, named, policy_stages, world_of
 from iowbc.commands.printed import tell
 from iowbc.commands.request import prepared
 from iowbc.deploy.exported_folder import CONTRACT
 from iowbc.errors import UsageError, require_known
+from iowbc.pipeline.console.wording import ago
 from iowbc.pipeline.stage_plan import Options
-from iowbc.pipeline.store.artifact import Artifact
+from iowbc.pipeline.store.artifact import INGREDIENTS, RECIPE, Artifact
 from iowbc.pipeline.store.last_used import recall, require_results, require_whole
+from iowbc.pipeline.store.locks import holder
+from iowbc.pipeline.store.runs import read_json, read_yaml
 from iowbc.pipeline.store.store import Store
+from iowbc.pipeline.store.workspace import unfinished
 from iowbc.recipe.evaluation.evaluation import Evaluation
 from iowbc.recipe.reading.loading import SUFFIXES, load_recipe
 from iowbc.recipe.recipe import Recipe
 from iowbc.stages.inputs import policy_stage
+from iowbc.stages.registry import STAGES
 from iowbc.task.specification import Specification
 
 if TYPE_CHECKING:
@@ -30,6 +35,7 @@ if TYPE_CHECKING:
     from iowbc.skill.lower_layer import Student
 
 SKILL = "skill"
+CHECKPOINT = Path("scratch", "training.checkpoint")
 
 
 @dataclass(frozen=True)
@@ -89,24 +95,23 @@ def named_source(
     A recipe file denotes the artifacts that `iowbc plan` reports as cached. The section `eval` of that file, or of the
     recipe's last run for a name, sets how they are played.
     """
-    from iowbc.evaluation.play import Source, exported_source, with_evaluation
+    from iowbc.evaluation.play import exported_source, with_evaluation
 
     if os.path.isfile(Path(word, CONTRACT)):
         return exported_source(Path(word))
-    training = in_training(store, word, stage)
-    if training is not None and training.recipe is not None:
-        tell(console, training.text)
-        generator = input_artifact(store, training.ingredients, "rg-fit", f"{training.stage} {training.key[:12]}")
-        return Source(world_of(training.recipe, generator), training.checkpoint, training.key)
+    training, checkpoint = in_training(store, word, stage)
+    if checkpoint is not None:
+        tell(console, training)
+        return checkpoint
     try:
         artifact = playable(store, word, stage, plan)
     except UsageError:
-        if training is None:
+        if not training:
             raise
         text = "there is neither a checkpoint that can be played nor a finished one; `iowbc status` tells how far it is"
-        raise UsageError(f"{training.text}; {text}") from None
-    if training is not None:
-        tell(console, f"{training.text}; this is a finished one")
+        raise UsageError(f"{training}; {text}") from None
+    if training:
+        tell(console, f"{training}; this is a finished one")
     known = {} if plan.recipe else recall(store.runs, word.partition("/")[0]).recipe
     asked = plan.recipe.eval if plan.recipe else Evaluation.model_validate(known["eval"]) if "eval" in known else None
     require_whole(store.runs, [artifact])
@@ -117,6 +122,29 @@ def named_source(
         require_known(scene, "scene", [*scenes, *(asked.scenes if asked else ())])
     source = whole_source(store, artifact)
     return source if asked is None else with_evaluation(source, asked)
+
+
+def in_training(store: Store, word: str, stage: str | None) -> "tuple[str, Source | None]":
+    """Message about the newest unfinished training that `RECIPE/STAGE`, or a recipe and `--stage`, names, empty without
+    one; and its checkpoint, if that can be played. Raises `UsageError` if its reference generator is gone."""
+    from iowbc.evaluation.play import Source
+
+    name, slash, last = word.rpartition("/")
+    name, wanted = (name, last) if slash and Path(word).suffix not in SUFFIXES else (word, stage)
+    if wanted not in STAGES or not STAGES[wanted].trained_by:
+        return "", None
+    own = [one for one in unfinished(store.runs) if (one[1].stage, one[1].recipe) == (wanted, name_in(name))]
+    if not own:
+        return "", None
+    folder, record = own[0]
+    checkpoint, ingredients, recipe = folder / CHECKPOINT, read_json(folder / INGREDIENTS), read_yaml(folder / RECIPE)
+    state = "is being trained" if holder(store.runs, folder.name) else "was interrupted"
+    text = f"{wanted} of {record.recipe} {state}{f', {record.share} done' if record.share else ''}"
+    if wanted != "teacher" or not (checkpoint.is_file() and recipe and ingredients):
+        return text, None
+    generator = input_artifact(store, ingredients, "rg-fit", f"{wanted} {folder.name[:12]}")
+    text += f"; this is its checkpoint of {ago(checkpoint.stat().st_mtime)}"
+    return text, Source(world_of(recipe, generator), checkpoint, folder.name)
 
 
 def whole_source(store: Store, artifact: Artifact) -> "Source":

@@ -15,8 +15,7 @@ from own_parts import own_part
 from rich.console import Console
 
 from iowbc.commands import printed
-from iowbc.commands.lookup import in_training
-from iowbc.commands.playable import Planned, named_source, planned, whole_source
+from iowbc.commands.playable import Planned, in_training, named_source, planned, whole_source
 from iowbc.commands.printed import film_progress
 from iowbc.errors import UsageError
 from iowbc.evaluation.play import requested_episode
@@ -32,26 +31,23 @@ ROOT = Path(__file__).parents[2]
 
 def test_an_unfinished_training_is_told_and_played_from_its_checkpoint(folder: Path) -> None:
     store = Store(Runs(folder / "runs"))
-    assert in_training(store, "first/teacher", None) is None
+    assert in_training(store, "first/teacher", None) == ("", None)
     workspace = Workspace(store.runs, "teacher", "f" * 64)
     workspace.begin("first", False, {})
     workspace.progress(42, 100, "")
     workspace.write()
-    told = in_training(store, "first/teacher", None)
-    assert told is not None
-    assert told.text == "teacher of first was interrupted, 42 % done"
-    assert told.recipe is None
+    assert in_training(store, "first/teacher", None) == ("teacher of first was interrupted, 42 % done", None)
     checkpoint = workspace.scratch / "training.checkpoint"
     checkpoint.write_bytes(b"")
     os.utime(checkpoint, 2 * (time.time() - 3600,))
     describe(workspace.root, {"inputs": {}}, "name: first\n")
-    playable = in_training(store, "first", "teacher")
+    told, playable = in_training(store, "first", "teacher")
     assert playable is not None
-    assert playable.recipe == {"name": "first"}
-    assert playable.text.startswith("teacher of first was interrupted, 42 % done; this is its checkpoint of 60 min ago")
-    assert in_training(store, "first", None) is None
-    assert in_training(store, "second/teacher", None) is None
-    assert in_training(store, "first/distill", None) is None
+    assert (playable.world.recipe, playable.policy, playable.key) == (Recipe(name="first"), checkpoint, "f" * 64)
+    assert told.startswith("teacher of first was interrupted, 42 % done; this is its checkpoint of 60 min ago")
+    assert in_training(store, "first", None) == ("", None)
+    assert in_training(store, "second/teacher", None) == ("", None)
+    assert in_training(store, "first/distill", None) == ("", None)
 
 
 def test_a_training_without_a_checkpoint_yet_is_told_in_one_sentence(folder: Path) -> None:

@@ -7,8 +7,7 @@ import pytest
 from workplace import Workplace
 
 from iowbc.commands.compare import trainings_table
-from iowbc.commands.lookup import in_training
-from iowbc.commands.playable import playable
+from iowbc.commands.playable import in_training, playable
 from iowbc.commands.results import headline, next_commands, policy_stages
 from iowbc.commands.ui import view
 from iowbc.learning.curves import Curves
@@ -90,9 +89,7 @@ def test_its_policy_is_the_one_to_play(run: Run, workplace: Workplace) -> None:
 
 def test_its_training_is_found_while_it_goes_on(run: Run, workplace: Workplace) -> None:
     Workspace(workplace.store.runs, "juggle", "f" * 64).begin("small", False, {})
-    found = in_training(workplace.store, "small/juggle", None)
-    assert found is not None
-    assert found.text.startswith("juggle of small was interrupted")
+    assert in_training(workplace.store, "small/juggle", None) == ("juggle of small was interrupted", None)
 
 
 def test_its_curves_and_steps_are_compared(run: Run) -> None:
