@@ -50,7 +50,7 @@ class Planner:
                 name: steps[name].artifact if steps[name].cached else None for name in stage.reads(self.loaded.recipe)
             }
             borrowed = self.borrowed(stage, known)
-            step = self.decide(stage, {**inputs, **borrowed}, whole=self.read_whole(stage))
+            step = self.decide(stage, {**inputs, **borrowed})
             if not step.cached and self._want_whole(stage, borrowed):
                 known.clear()
                 return self.plan(known)
@@ -67,10 +67,6 @@ class Planner:
     def chain(self) -> "list[Planner]":
         """This planner and those of all recipes that it begins from, each once."""
         return list(dict.fromkeys([self, *(one for origin in self.origins.values() for one in origin.chain())]))
-
-    def read_whole(self, stage: Stage) -> bool:
-        """True if only a whole artifact of a stage does."""
-        return self.whole and stage is self.stages[-1]
 
     def _want_whole(self, stage: Stage, borrowed: Mapping[str, Artifact | None]) -> bool:
         """True if a stage that runs borrows artifacts that are not whole; from now on their recipes make them.
@@ -115,8 +111,9 @@ class Planner:
     def decide(self, stage: Stage, inputs: Mapping[str, Artifact | None], *, whole: bool = False) -> StagePlan:
         """The plan for a stage with these inputs; None is an input that would be made anew.
 
-        whole: a published artifact does not do that leaves out large files.
+        whole: a published artifact does not do that leaves out large files, as of the last stage with `self.whole`.
         """
+        whole = whole or (self.whole and stage is self.stages[-1])
         unknown = [name for name, artifact in inputs.items() if artifact is None]
         ingredients = {
             "stage": stage.name,

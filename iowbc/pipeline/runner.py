@@ -90,7 +90,7 @@ class Runner:
             for stage in self.planner.stages:
                 if self.interrupted():
                     raise Interrupted
-                self.artifacts[stage.name] = self._artifact(stage, whole=self.planner.read_whole(stage))
+                self.artifacts[stage.name] = self._artifact(stage)
                 remember(self.store.runs, self.loaded, self.artifacts[stage.name])
         except Exception as error:
             if isinstance(error, (PipelineFailed, Interrupted)) or not is_disk_full(error):
@@ -103,11 +103,8 @@ class Runner:
             self.display.end()
         return self.artifacts
 
-    def _artifact(self, stage: Stage, *, whole: bool) -> Artifact:
-        """The stage's artifact: the stored one where it can be used, else a new one.
-
-        whole: a published one does not do that leaves out large files.
-        """
+    def _artifact(self, stage: Stage, *, whole: bool = False) -> Artifact:
+        """The stage's artifact: the stored one where it can be used, else a new one. whole: see `Planner.decide`."""
         step = self._decide(stage, whole)
         if step.cached:
             self._clear(stage, step.key)

@@ -168,9 +168,9 @@ def test_a_recipe_that_is_not_there_is_refused_with_its_place(workplace: Workpla
 def test_a_recipe_that_several_begin_from_is_planned_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     decided, decide = Counter[tuple[Path, str | None, str]](), Planner.decide
 
-    def counted(self: Planner, stage: Stage, inputs: Any, *, whole: bool) -> StagePlan:
+    def counted(self: Planner, stage: Stage, inputs: Any) -> StagePlan:
         decided[self.loaded.file, self.options.until, stage.name] += 1
-        return decide(self, stage, inputs, whole=whole)
+        return decide(self, stage, inputs)
 
     monkeypatch.setattr(Planner, "decide", counted)
     experts = load_recipe(Path(__file__).parents[2] / "recipes" / "experts" / "quick.yaml")
