@@ -1,11 +1,10 @@
 """On-policy distillation of the teacher into the student (paper eq. 7)."""
 
-from collections.abc import Iterator
 from typing import Literal
 
 from pydantic import Field
 
-from iowbc.recipe.section import COSMETIC, DEEPEST, LATER, ArtifactName, Encoder, Width
+from iowbc.recipe.section import COSMETIC, LATER, ArtifactName, Encoder, HiddenLayers, Problems
 
 
 class Distillation(Encoder):
@@ -28,7 +27,7 @@ class Distillation(Encoder):
     """Initial weights of the layers behind the encoder. `teacher`: the teacher's own layers; their input s_priv is
     replaced by a linear estimate from the latent, which is initially the training mean, so that training begins with
     the teacher's behaviour. `anew`: random weights, with the latent as input."""
-    hidden: tuple[Width, ...] = Field(default=(512, 256, 128), max_length=DEEPEST)
+    hidden: HiddenLayers = (512, 256, 128)
     """Hidden layers behind the encoder (paper Table I) with `start: anew`; otherwise they are the teacher's."""
     activation: Literal["elu", "relu", "tanh"] = "elu"
     """Activation of encoder and hidden layers with `start: anew`; otherwise they have the teacher's."""
@@ -66,6 +65,6 @@ class Distillation(Encoder):
     checkpoint_every: int = Field(default=50, ge=1, le=1_000_000, json_schema_extra=COSMETIC)
     """Rounds between two checkpoints."""
 
-    def problems(self) -> Iterator[tuple[str, str]]:
+    def problems(self) -> Problems:
         if self.batch > self.buffer:
             yield "", f"batch ({self.batch}) is larger than buffer ({self.buffer})"

@@ -1,11 +1,9 @@
 """The ONNX graph, its checks, and the acceptance trials of the exported controller."""
 
-from collections.abc import Iterator
-
 from pydantic import Field
 
 from iowbc.recipe.evaluation.sequences import Segment
-from iowbc.recipe.section import COSMETIC, LATER, Section
+from iowbc.recipe.section import COSMETIC, LATER, Problems, Section
 from iowbc.recipe.simulation.holding import ObjectScene
 
 
@@ -35,7 +33,7 @@ class Acceptance(Section):
     """Smallest number of survived trials with the object carried and transported for the stage to succeed; 0: report
     only."""
 
-    def problems(self) -> Iterator[tuple[str, str]]:
+    def problems(self) -> Problems:
         if self.minimum > self.trials:
             yield "", f"minimum {self.minimum} exceeds the {self.trials} trials"
 

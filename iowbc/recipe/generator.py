@@ -1,13 +1,10 @@
 """The reference generator: its dataset and its network."""
 
-from collections.abc import Iterator
 from typing import Annotated, Literal
 
 from pydantic import Field
 
-from iowbc.recipe.section import DEEPEST, LATER, Interval, NonNegative, Positive, Section, Width
-
-Share = Annotated[float, Field(ge=0, le=1)]
+from iowbc.recipe.section import LATER, HiddenLayers, Interval, NonNegative, Positive, Problems, Section, Share
 
 
 class WristRegion(Section):
@@ -49,7 +46,7 @@ class Sampling(Section):
     mirrored_share: Share = 0.05
     """Fraction of the samples that mirror another one left to right, to measure the labels' symmetry."""
 
-    def problems(self) -> Iterator[tuple[str, str]]:
+    def problems(self) -> Problems:
         if self.heading_share + self.torso_share > 1.0:
             yield "", "heading_share and torso_share together pass 1"
 
@@ -210,7 +207,7 @@ class SmoothnessCheck(Section):
 class Fit(Section):
     """The network φ_RG and its training."""
 
-    hidden: tuple[Width, ...] = Field(default=(128, 64), min_length=1, max_length=DEEPEST)
+    hidden: HiddenLayers = Field(default=(128, 64), min_length=1)
     """Widths of the hidden layers (paper's order of size), ELU."""
     held_out: Annotated[float, Field(gt=0, lt=1)] = 0.1
     """Fraction of the samples held out for the gates; a sample and its mirror image are on the same side."""

@@ -1,6 +1,5 @@
 """The whole recipe: one experiment, from the reference generator to the exported policy."""
 
-from collections.abc import Iterator
 from typing import Any, Literal, Self, get_args
 
 from pydantic import Field, field_validator
@@ -11,7 +10,7 @@ from iowbc.recipe.execution import Execution
 from iowbc.recipe.export import Export
 from iowbc.recipe.generator import ReferenceGenerator
 from iowbc.recipe.scene_names import scene_name_problems
-from iowbc.recipe.section import Section
+from iowbc.recipe.section import Problems, Section
 from iowbc.recipe.simulation.holding import held_delay_problems
 from iowbc.recipe.simulation.simulation import SimulationSettings
 from iowbc.recipe.skill.skill import Skill
@@ -68,7 +67,7 @@ class Recipe(Section):
         observation = self.task.observation.model_copy(update={"own": {}})
         return self.model_copy(update={"task": self.task.model_copy(update={"observation": observation})})
 
-    def problems(self) -> Iterator[tuple[str, str]]:
+    def problems(self) -> Problems:
         student = self.distill
         unpaired = [units for units in (student.latent, *student.hidden) if units % 2]
         if self.teacher.symmetry == "construction" and unpaired:

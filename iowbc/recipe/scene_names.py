@@ -1,11 +1,11 @@
 """Validation of scene names in a recipe, and of the entries that custom scenes require."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from iowbc.errors import nearest
 from iowbc.recipe.evaluation.evaluation import TrialScene
-from iowbc.recipe.section import marked_fields
+from iowbc.recipe.section import Problems, marked_fields
 from iowbc.recipe.simulation.holding import WITH_OBJECT
 from iowbc.recipe.simulation.scene import Scenes
 from iowbc.recipe.task.task import Task
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from iowbc.recipe.recipe import Recipe
 
 
-def scene_name_problems(recipe: "Recipe") -> Iterator[tuple[str, str]]:
+def scene_name_problems(recipe: "Recipe") -> Problems:
     """Invalid scene names and incomplete custom scenes: pairs of a dotted path and a message."""
     simulation, task, evaluation = recipe.simulation, recipe.task, recipe.eval
     worlds = {"simulation.scenes": simulation.scenes}
@@ -47,14 +47,14 @@ def with_scenes(scenes: Scenes, further: Mapping[str, TrialScene]) -> Scenes:
     return Scenes.model_validate({**dict(scenes), **{name: own.scene for name, own in further.items()}})
 
 
-def _unknown(path: str, names: tuple[str, ...], known: tuple[str, ...]) -> Iterator[tuple[str, str]]:
+def _unknown(path: str, names: tuple[str, ...], known: tuple[str, ...]) -> Problems:
     for name in names:
         if name not in known:
             text = f"no scene {name!r} in simulation.scenes; there are: {', '.join(known)}{nearest(name, known)}"
             yield f"{path}.{name}", text
 
 
-def _incomplete(path: str, name: str, scenes: Scenes, task: Task) -> Iterator[tuple[str, str]]:
+def _incomplete(path: str, name: str, scenes: Scenes, task: Task) -> Problems:
     """Missing entries of a custom scene."""
     scene, references = getattr(scenes, name), task.references
     if name not in references.grasps.names:
@@ -67,7 +67,7 @@ def _incomplete(path: str, name: str, scenes: Scenes, task: Task) -> Iterator[tu
         yield path, f"{text} task.references.loads.{name}: {half:g}"
 
 
-def _without_object(path: str, name: str, where: str, scenes: Scenes) -> Iterator[tuple[str, str]]:
+def _without_object(path: str, name: str, where: str, scenes: Scenes) -> Problems:
     loaded = [known for known in scenes.names if getattr(scenes, known).object is not None]
     if name not in loaded:
         text = f"no scene {name!r} with an object; valid: {', '.join(loaded)}; a mass of 0 is without one"

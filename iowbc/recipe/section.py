@@ -23,6 +23,10 @@ LATER: dict[str, Any] = {"later": True}
 the key, so that the keys of those artifacts stay valid."""
 
 
+Problems = Iterator[tuple[str, str]]
+"""Inconsistent values of a recipe: pairs of a dotted path and a message."""
+
+
 def in_order(ends: tuple[float, float]) -> tuple[float, float]:
     """The lower and upper end of a range. Raises ValueError if the lower end is above the upper end."""
     if ends[0] > ends[1]:
@@ -54,14 +58,13 @@ Positive = Annotated[float, Field(gt=0)]
 NonNegative = Annotated[float, Field(ge=0)]
 PositiveRange = Annotated[tuple[PositiveFloat, PositiveFloat], AfterValidator(in_order)]
 NonNegativeRange = Annotated[tuple[NonNegative, NonNegative], AfterValidator(in_order)]
-Width = Annotated[int, Field(gt=0, le=16_384)]
-"""Units of a hidden layer."""
+Share = Annotated[float, Field(ge=0, le=1)]
+HiddenLayers = Annotated[tuple[Annotated[int, Field(gt=0, le=16_384)], ...], Field(max_length=16)]
+"""Units of the hidden layers of a network."""
 ArtifactName = Annotated[str, Field(pattern=r"^([0-9a-f]{8,64}|.+\.ya?ml)$", max_length=300)]
 """Artifact of another recipe: that recipe's file, or the first characters (8 or more) of the artifact's key."""
 RecipeFile = Annotated[str, Field(pattern=r".+\.ya?ml$", max_length=300)]
 """The file of another recipe."""
-DEEPEST = 16
-"""Largest number of hidden layers of a network."""
 OWN_NAME = "[a-z][a-z0-9_]{0,31}"
 """Pattern of the name of a custom scene or reward term."""
 CustomName = Annotated[str, Field(pattern=f"^{OWN_NAME}$")]
@@ -82,7 +85,7 @@ class Section(BaseModel):
         """True if this entry of a mapping has no effect; such an entry is not part of the key."""
         return False
 
-    def problems(self) -> Iterator[tuple[str, str]]:
+    def problems(self) -> Problems:
         """Inconsistent values: pairs of a dotted path relative to this section (empty: itself) and a message."""
         return iter(())
 
@@ -123,7 +126,7 @@ class Interval(Section):
     high: float
     """Largest value."""
 
-    def problems(self) -> Iterator[tuple[str, str]]:
+    def problems(self) -> Problems:
         if self.low > self.high:
             yield "", f"low ({self.low}) is above high ({self.high})"
 
@@ -152,7 +155,7 @@ class NamedEntries(Section):
         object.__setattr__(self, "__pydantic_extra__", dict(sorted((self.model_extra or {}).items())))
         return self
 
-    def problems(self) -> Iterator[tuple[str, str]]:
+    def problems(self) -> Problems:
         for name in self.own:
             if not re.fullmatch(OWN_NAME, name):
                 yield "", f"{name!r} is no name: one begins with a letter and has up to 32 of a-z, 0-9 and _"

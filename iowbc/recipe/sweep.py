@@ -7,7 +7,7 @@ import json
 import math
 import random
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -20,7 +20,7 @@ from iowbc.recipe.reading.loading import LoadedRecipe, load_recipe, read_text
 from iowbc.recipe.reading.study import load_study
 from iowbc.recipe.reading.validation import descend
 from iowbc.recipe.recipe import NAME
-from iowbc.recipe.section import Interval, Section
+from iowbc.recipe.section import Interval, Problems, Section
 
 DIGITS = 4
 """Significant digits of a drawn value, so that it is easy to read and type; further digits do not matter."""
@@ -38,7 +38,7 @@ class Drawn(Interval):
     whole: bool = False
     """Round to an integer."""
 
-    def problems(self) -> Iterator[tuple[str, str]]:
+    def problems(self) -> Problems:
         if self.high <= self.low:
             yield "", f"high {self.high} is not greater than low {self.low}"
         if not math.isfinite(self.high - self.low):

@@ -1,13 +1,13 @@
 """PPO with privileged information (paper section III-C, Table I)."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any, ClassVar, Literal
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from iowbc.recipe.evaluation.sequences import DrawnScripts, Segment
 from iowbc.recipe.ppo import PPO
-from iowbc.recipe.section import COSMETIC, DEEPEST, LATER, ArtifactName, Encoder, PositiveRange, Section, Width
+from iowbc.recipe.section import COSMETIC, LATER, ArtifactName, Encoder, HiddenLayers, PositiveRange, Problems, Section
 from iowbc.recipe.simulation.holding import ObjectScene
 
 STAND_WALK_TURN = (
@@ -121,7 +121,7 @@ class Teacher(PPO):
     the cost of fewer different states (docs/log/groups.md). 1: separate environments, as in the paper."""
     rollout: int = Field(default=48, ge=2, le=10_000)
     """Control steps that each environment contributes to one update."""
-    hidden: tuple[Width, ...] = Field(default=(512, 256, 128), max_length=DEEPEST)
+    hidden: HiddenLayers = (512, 256, 128)
     """Hidden layers of policy and value network (paper Table I)."""
     learning_rate: float = Field(default=2e-4, gt=0)
     """Initial learning rate of Adam (paper Table I)."""
@@ -190,7 +190,7 @@ class Teacher(PPO):
     checkpoint_every: int = Field(default=20, ge=1, le=1_000_000, json_schema_extra=COSMETIC)
     """Updates between two checkpoints."""
 
-    def problems(self) -> Iterator[tuple[str, str]]:
+    def problems(self) -> Problems:
         if not self.std_floor < self.std_end <= self.initial_std:
             stds = f"{self.std_floor:g}, {self.std_end:g}, {self.initial_std:g}"
             yield "", f"std_floor, std_end and initial_std must ascend, got {stds}"

@@ -1,6 +1,6 @@
 """Settings of the evaluation: suites of trials, their simulation, success criteria and videos."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any, ClassVar, Literal
 
 from pydantic import Field
@@ -9,7 +9,7 @@ from iowbc.recipe.evaluation.model_based import ModelBased
 from iowbc.recipe.evaluation.public_controller import PublicController
 from iowbc.recipe.evaluation.sequences import DrawnScripts, Segment
 from iowbc.recipe.evaluation.suites import Compliance, HeavyCase, MassSweep, Probe, PushMap, Robustness, Stagnation
-from iowbc.recipe.section import COSMETIC, LATER, CustomName, Section
+from iowbc.recipe.section import COSMETIC, LATER, CustomName, Problems, Section
 from iowbc.recipe.simulation.scene import Object, Scene
 from iowbc.recipe.simulation.simulation import SimulationSettings
 
@@ -192,7 +192,7 @@ class Evaluation(Section):
     video: Video = Field(default=Video(), json_schema_extra=COSMETIC)
     """Videos of trials."""
 
-    def problems(self) -> Iterator[tuple[str, str]]:
+    def problems(self) -> Problems:
         suites = {
             "heavy": self.heavy,
             "stagnation": () if self.stagnation is None else self.stagnation.cases,

@@ -1,12 +1,11 @@
 """Third-party controllers as baselines."""
 
-from collections.abc import Iterator
 from typing import Literal
 
 from pydantic import Field
 
 from iowbc.recipe.beside import ModuleFile
-from iowbc.recipe.section import COSMETIC, Section
+from iowbc.recipe.section import COSMETIC, Problems, Section
 
 
 class PublicController(Section):
@@ -36,6 +35,6 @@ class PublicController(Section):
         """True where the arms follow the controller's outputs in some trials."""
         return self.arms in ("free", "own")
 
-    def problems(self) -> Iterator[tuple[str, str]]:
+    def problems(self) -> Problems:
         if (self.adapter == "own") != (self.module is not None):
             yield "", "module: belongs to the adapter 'own', which needs it"

@@ -4,12 +4,11 @@ All fixed sequences command steps, so that a robot that stands still fails each 
 `task.commands.rates` and stay within the feasible postures.
 """
 
-from collections.abc import Iterator
 from typing import Annotated
 
 from pydantic import Field
 
-from iowbc.recipe.section import Range, Section
+from iowbc.recipe.section import Problems, Range, Section
 
 Offset = Annotated[float, Field(ge=-0.5, le=0.5)]
 """Wrist offset along an axis [m]; arms of this size cannot reach farther from the grasp."""
@@ -31,7 +30,7 @@ class Segment(Section):
     wrists: tuple[Offset, Offset, Offset, Offset, Offset, Offset] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     """Wrist offsets Δp, left then right, heading frame [m]."""
 
-    def problems(self) -> Iterator[tuple[str, str]]:
+    def problems(self) -> Problems:
         if self.ramp > self.duration:
             yield "", f"ramp {self.ramp} s is longer than the segment's duration {self.duration} s"
 

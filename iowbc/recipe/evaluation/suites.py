@@ -1,12 +1,11 @@
 """Suites of trials: mass sweeps, single cases, pushes, a probe of the history, and interaction with partners."""
 
-from collections.abc import Iterator
 from typing import Annotated, Literal, get_args
 
 from pydantic import Field, PositiveFloat
 
 from iowbc.recipe.evaluation.sequences import BOWING, PROBED, STAGNATION, STANDING, WALKING, WALKING_ON, Segment
-from iowbc.recipe.section import Ascending, Distinct, Masses, Section
+from iowbc.recipe.section import Ascending, Distinct, Masses, Problems, Section
 from iowbc.recipe.simulation.holding import Held, ObjectScene
 from iowbc.recipe.simulation.partner import BEHAVIOURS
 
@@ -66,7 +65,7 @@ class MassSweep(Section):
         given = {name: value for one in own for name, value in one if value is not None and name != "partner_share"}
         return self.model_copy(update={**given, "partner_shares": (share,), "with_share": ()})
 
-    def problems(self) -> Iterator[tuple[str, str]]:
+    def problems(self) -> Problems:
         if len(set(self.partner_shares)) != len(self.partner_shares):
             yield "", f"partner_shares must differ, got {list(self.partner_shares)}"
         named = [one.partner_share for one in self.with_share]
@@ -145,7 +144,7 @@ class PushLadder(Section):
     sequence: tuple[Segment, ...] = Field(default=STANDING, min_length=1)
     """Commands during the trial."""
 
-    def problems(self) -> Iterator[tuple[str, str]]:
+    def problems(self) -> Problems:
         end = sum(segment.duration for segment in self.sequence)
         if self.time + self.duration > end:
             yield "", f"time: a push from {self.time:g} to {self.time + self.duration:g} s is not within the {end:g} s"
@@ -228,7 +227,7 @@ class Probe(Section):
     interval: float = Field(default=0.5, gt=0)
     """Time between two samples [s]: the length of a history of 25 observations, so that samples share none."""
 
-    def problems(self) -> Iterator[tuple[str, str]]:
+    def problems(self) -> Problems:
         if self.masses[0] >= self.masses[1]:
             yield "", f"masses must be a lightest and a heavier one, got {list(self.masses)}"
 
@@ -278,7 +277,7 @@ class Compliance(Section):
     impedance: Impedance | None = Impedance()
     """Sinusoidal pulls; empty: none."""
 
-    def problems(self) -> Iterator[tuple[str, str]]:
+    def problems(self) -> Problems:
         for name in self.behaviours:
             if name not in BEHAVIOURS:
                 yield "", f"no partner behaviour {name!r}; valid: {', '.join(BEHAVIOURS)}"

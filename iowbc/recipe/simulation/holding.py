@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator, Field
 
-from iowbc.recipe.section import Section, marked_fields
+from iowbc.recipe.section import Problems, Section, marked_fields
 from iowbc.recipe.simulation.partner import BEHAVIOURS, OWN_DRAWS, PartnerSettings
 from iowbc.recipe.simulation.randomization import LATENCIES, POSITIVE, SIGNED, Distribution, Randomization
 from iowbc.recipe.simulation.scene import Scenes
@@ -81,7 +81,7 @@ HELD = AfterValidator(_known_quantities)
 Held = Annotated[dict[str, float], HELD, BeforeValidator(_behaviour_by_name)]
 
 
-def held_delay_problems(section: Section, path: str, simulation: SimulationSettings) -> Iterator[tuple[str, str]]:
+def held_delay_problems(section: Section, path: str, simulation: SimulationSettings) -> Problems:
     """Delays below a section that are fixed beyond the delay lines of the simulation."""
     buffered = simulation.randomization.longest_latency, "simulation.randomization.longest_latency"
     felt = simulation.partner.longest_delay, "the longest of simulation.partner.delay and .lagging.delay"

@@ -1,10 +1,8 @@
 """The simulated partner who carries or pushes at the object's far handle."""
 
-from collections.abc import Iterator
-
 from pydantic import Field
 
-from iowbc.recipe.section import LATER, Section
+from iowbc.recipe.section import LATER, Problems, Section
 from iowbc.recipe.simulation.randomization import Distribution, not_negative
 
 LONGEST_DELAY = 10.0
@@ -27,7 +25,7 @@ class Behaviours(Section):
     stopping: float = Field(default=0.0, ge=0.0)
     """Follows the commanded motion, stops or reverses suddenly, and resumes."""
 
-    def problems(self) -> Iterator[tuple[str, str]]:
+    def problems(self) -> Problems:
         if sum(share for _, share in self) <= 0.0:
             yield "", "every behaviour has the share 0: give at least one of them a positive share"
 
@@ -59,7 +57,7 @@ class Stopping(Section):
     catching_up: float = Field(default=1.0, gt=0.0)
     """Time in which the partner returns to the handle after the stop [s]; otherwise it would hold back for ever."""
 
-    def problems(self) -> Iterator[tuple[str, str]]:
+    def problems(self) -> Problems:
         yield from not_negative(self, "begin", "duration")
 
 
@@ -141,7 +139,7 @@ class PartnerSettings(Section):
     """Bound on damping · period / mass and stiffness · period² / mass, with the effective mass at the handle. Above it,
     a force held over a control period would make a light object oscillate."""
 
-    def problems(self) -> Iterator[tuple[str, str]]:
+    def problems(self) -> Problems:
         yield from not_negative(self, "share_drift", "stiffness", "damping", "delay", "noise")
         if self.longest_delay > LONGEST_DELAY:
             yield "delay", f"should be 0 to {LONGEST_DELAY:g} s"

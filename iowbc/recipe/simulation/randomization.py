@@ -1,11 +1,10 @@
 """Domain randomization: quantities drawn per episode, and disturbances within one; ranges of the paper's Table I."""
 
-from collections.abc import Iterator
 from typing import Literal
 
 from pydantic import Field
 
-from iowbc.recipe.section import LATER, Interval, Section
+from iowbc.recipe.section import LATER, Interval, Problems, Section
 
 
 class Distribution(Interval):
@@ -20,13 +19,13 @@ class Distribution(Interval):
     enabled: bool = True
     """Enable the randomization; otherwise always the nominal value."""
 
-    def problems(self) -> Iterator[tuple[str, str]]:
+    def problems(self) -> Problems:
         yield from super().problems()
         if self.shape == "log-uniform" and self.low <= 0.0:
             yield "", f"a log-uniform range must be positive, got low {self.low}"
 
 
-def not_negative(section: Section, *names: str) -> Iterator[tuple[str, str]]:
+def not_negative(section: Section, *names: str) -> Problems:
     """Problems of a section whose distributions of these names have negative values."""
     for name in names:
         values = getattr(section, name)
@@ -104,7 +103,7 @@ class Randomization(Section):
     longest_latency: int = Field(default=4, ge=1, le=100)
     """Length of the delay buffers [control periods]; no latency may exceed it."""
 
-    def problems(self) -> Iterator[tuple[str, str]]:
+    def problems(self) -> Problems:
         for name, values in self:
             for end in ("low", "high", "nominal") if isinstance(values, Distribution) else ():
                 value = getattr(values, end)
@@ -130,7 +129,7 @@ class Impulses(Section):
     duration: float = Field(default=0.1, gt=0.0)
     """Duration of an impulse, a constant force [s]."""
 
-    def problems(self) -> Iterator[tuple[str, str]]:
+    def problems(self) -> Problems:
         yield from not_negative(self, "interval", "magnitude")
 
 
@@ -146,5 +145,5 @@ class Pushes(Section):
     duration: float = Field(default=0.1, gt=0.0)
     """Duration of a push, a constant force [s]."""
 
-    def problems(self) -> Iterator[tuple[str, str]]:
+    def problems(self) -> Problems:
         yield from not_negative(self, "interval", "speed")

@@ -1,12 +1,11 @@
 """Scenes of the simulation: no object, an object held between the wrists, a crate to push, and custom scenes."""
 
-from collections.abc import Iterator
 from typing import Literal
 
 from pydantic import Field
 
 from iowbc.recipe.beside import MeshFile
-from iowbc.recipe.section import LATER, NamedEntries, Section
+from iowbc.recipe.section import LATER, NamedEntries, Problems, Section
 
 Size = tuple[float, float, float]
 
@@ -72,7 +71,7 @@ class Object(Section):
     scale: float = Field(default=1.0, gt=0.0, json_schema_extra=LATER)
     """Metres per unit of the mesh: 0.001 for a file in millimetres."""
 
-    def problems(self) -> Iterator[tuple[str, str]]:
+    def problems(self) -> Problems:
         if (self.shape == "mesh") != (self.mesh is not None):
             yield "", f"shape {self.shape!r}: {'give its file, `mesh`' if self.mesh is None else 'has no mesh'}"
         elif (self.shape == "mesh") != (self.size is None):
@@ -107,7 +106,7 @@ class Scene(Section):
     creep: float = Field(default=0.02, gt=0.0)
     """Speed below which a crate counts as at rest [m/s]; the solver lets a stuck crate creep at 1 mm/s."""
 
-    def problems(self) -> Iterator[tuple[str, str]]:
+    def problems(self) -> Problems:
         if (self.kind == "free") != (self.object is None):
             yield "", f"a {self.kind} scene {'has no' if self.kind == 'free' else 'needs an'} object"
         by_contact = self.kind == "lift" and self.grasp.kind == "contact"

@@ -1,6 +1,6 @@
 """The skill layer of a recipe: tasks, agents and reward of the Markov game."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any, ClassVar, Literal
 
 from pydantic import Field
@@ -8,19 +8,20 @@ from pydantic import Field
 from iowbc.recipe.ppo import PPO
 from iowbc.recipe.section import (
     COSMETIC,
-    DEEPEST,
     LATER,
     ArtifactName,
     Ascending,
+    HiddenLayers,
     Positive,
     PositiveRange,
+    Problems,
     RecipeFile,
     Section,
-    Width,
+    Share,
 )
 from iowbc.recipe.simulation.holding import ObjectScene
 from iowbc.recipe.simulation.partner import BEHAVIOURS
-from iowbc.recipe.skill.task import Share, Tasks
+from iowbc.recipe.skill.task import Tasks
 
 LARGEST_ROLLOUT = 1_000_000
 """Largest number of decisions of an update; they are kept in memory."""
@@ -53,7 +54,7 @@ class SkillLearning(PPO):
     """Gradient steps of the imitation after each rollout."""
     imitation_rate: float = Field(default=1e-3, gt=0)
     """Adam's learning rate of the imitation."""
-    hidden: tuple[Width, ...] = Field(default=(128, 128), max_length=DEEPEST)
+    hidden: HiddenLayers = (128, 128)
     """Hidden layers of the policies and of the value network."""
     normalization_clip: float = Field(default=5.0, gt=0)
     """Bound to which normalized inputs are clipped [standard deviations]."""
@@ -74,7 +75,7 @@ class SkillLearning(PPO):
     checkpoint_every: int = Field(default=5, ge=1, le=1_000_000, json_schema_extra=COSMETIC)
     """Updates between two checkpoints."""
 
-    def problems(self) -> Iterator[tuple[str, str]]:
+    def problems(self) -> Problems:
         samples = self.games * self.rollout
         if samples > LARGEST_ROLLOUT:
             yield "", f"games x rollout is {samples:,}; at most {LARGEST_ROLLOUT:,} are kept in memory"
@@ -249,7 +250,7 @@ class PartnerKinds(Section):
     held_out: tuple[PartnerKind, ...] = ("tugging", "lagging")
     """Humans of the evaluation only."""
 
-    def problems(self) -> Iterator[tuple[str, str]]:
+    def problems(self) -> Problems:
         if both := set(self.training) & set(self.held_out):
             yield "", f"{', '.join(sorted(both))}: both in training and held out; name it once"
         if not self.training:

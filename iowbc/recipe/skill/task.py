@@ -5,10 +5,8 @@ from typing import Annotated
 
 from pydantic import AfterValidator, Field
 
-from iowbc.recipe.section import NamedEntries, NonNegativeRange, Section, in_order
+from iowbc.recipe.section import NamedEntries, NonNegativeRange, Section, Share, in_order
 from iowbc.recipe.simulation.holding import ObjectScene
-
-Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
 class Stretch(Section):

@@ -1,10 +1,8 @@
 """The 11-D skill-level command and how it is drawn in training."""
 
-from collections.abc import Iterator
-
 from pydantic import Field
 
-from iowbc.recipe.section import Range, Section
+from iowbc.recipe.section import Problems, Range, Section
 
 Vector = tuple[float, float, float]
 
@@ -87,6 +85,6 @@ class Commands(Section):
     rates: CommandRates = CommandRates()
     """Rate limits."""
 
-    def problems(self) -> Iterator[tuple[str, str]]:
+    def problems(self) -> Problems:
         if self.resampling[0] <= 0.0:
             yield "", f"resampling: {self.resampling[0]} s is no positive time"

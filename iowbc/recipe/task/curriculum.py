@@ -1,10 +1,8 @@
 """The training curriculum: four axes with separate levels, in the order of the paper's three phases."""
 
-from collections.abc import Iterator
-
 from pydantic import Field
 
-from iowbc.recipe.section import LATER, Section
+from iowbc.recipe.section import LATER, Problems, Section
 
 
 class Scale(Section):
@@ -110,6 +108,6 @@ class Curriculum(Section):
     limit: float = Field(default=2.0, ge=0.0, le=2.0)
     """Highest level of any axis."""
 
-    def problems(self) -> Iterator[tuple[str, str]]:
+    def problems(self) -> Problems:
         if self.fixed_level > self.limit:
             yield "", f"fixed_level: {self.fixed_level} is above the limit of {self.limit}"

@@ -1,11 +1,10 @@
 """Joint references computed from a command."""
 
-from collections.abc import Iterator
 from typing import Annotated, Literal
 
 from pydantic import Field
 
-from iowbc.recipe.section import LATER, NamedEntries, Section
+from iowbc.recipe.section import LATER, NamedEntries, Problems, Section
 
 Vector = tuple[float, float, float]
 
@@ -164,7 +163,7 @@ class GaitPrior(Section):
     placement: Placement | None = Field(default=None, json_schema_extra=LATER)
     """Feedback of the estimated forward speed on footholds; empty: none."""
 
-    def problems(self) -> Iterator[tuple[str, str]]:
+    def problems(self) -> Problems:
         if self.placement is not None and not self.enabled:
             yield "", "placement: moves the feet of the gait prior, which is off (`enabled: false`); empty it"
 
@@ -196,7 +195,7 @@ class References(Section):
     height: HeightFeedback | None = Field(default=None, json_schema_extra=LATER)
     """Feedback of the height on the legs; empty: none."""
 
-    def problems(self) -> Iterator[tuple[str, str]]:
+    def problems(self) -> Problems:
         if self.height is not None and not self.gait.enabled:
             yield "", "height: stretches the legs of the gait prior, which is off (`gait.enabled: false`); empty it"
         for name, grasp in self.grasps:

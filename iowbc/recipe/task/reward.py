@@ -1,12 +1,11 @@
 """Terms and weights of the reward."""
 
-from collections.abc import Iterator
 from typing import Literal
 
 from pydantic import Field
 
 from iowbc.recipe.beside import CustomFunction
-from iowbc.recipe.section import LATER, CustomName, Section
+from iowbc.recipe.section import LATER, CustomName, Problems, Section
 
 
 class Kernel(Section):
@@ -166,7 +165,7 @@ class Later(Section):
     """Later weight by the dotted path of a term in `task.reward`, such as `sync.progress`, which teaches walking but
     makes a robot that walks hurry."""
 
-    def problems(self) -> Iterator[tuple[str, str]]:
+    def problems(self) -> Problems:
         if self.begin >= self.end:
             yield "", f"begin {self.begin:g} must be below end {self.end:g}"
 
@@ -195,7 +194,7 @@ class Reward(Section):
     own: dict[CustomName, CustomTerm] = Field(default_factory=dict, json_schema_extra=LATER)
     """Custom terms by name, which is also that of their training curve; only training executes them."""
 
-    def problems(self) -> Iterator[tuple[str, str]]:
+    def problems(self) -> Problems:
         groups = {name: value for name, value in self if isinstance(value, Section) and name != "later"}
         terms = {"alive", "termination"} | {
             f"{group}.{name}"

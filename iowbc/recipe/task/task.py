@@ -1,12 +1,11 @@
 """The Markov decision process: action, observation, termination, and the sections in the other files."""
 
-from collections.abc import Iterator
 from typing import Annotated, Literal, Self
 
 from pydantic import Field
 
 from iowbc.recipe.beside import CustomFunction
-from iowbc.recipe.section import LATER, CustomName, NamedEntries, PositiveRange, Section
+from iowbc.recipe.section import LATER, CustomName, NamedEntries, PositiveRange, Problems, Section
 from iowbc.recipe.task.commands import Commands
 from iowbc.recipe.task.curriculum import Curriculum
 from iowbc.recipe.task.joint_references import References
@@ -89,7 +88,7 @@ class SceneShares(NamedEntries):
     def only(cls, scene: str) -> Self:
         return cls.model_validate(dict.fromkeys(cls.model_fields, 0.0) | {scene: 1.0})
 
-    def problems(self) -> Iterator[tuple[str, str]]:
+    def problems(self) -> Problems:
         yield from super().problems()
         if sum(share for _, share in self) <= 0.0:
             yield "", "every share is zero: give at least one scene a positive share"
