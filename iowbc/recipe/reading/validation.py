@@ -100,8 +100,7 @@ def _each_problem(tree: Located, error: ErrorDetails) -> Iterator[tuple[str, str
     reason = error.get("ctx", {}).get("error")
     if isinstance(reason, InconsistentValues):
         for dotted, text in reason.problems:
-            below = [int(part) if part.isdecimal() else part for part in dotted.split(".")]
-            path, found = descend(tree, [*error["loc"], *below])
+            path, found = descend(tree, [*error["loc"], *dotted.split(".")])
             yield found.place, _head(path, found), text
     else:
         yield _problem(tree, error)
@@ -155,8 +154,8 @@ def descend(tree: Located, location: Sequence[int | str]) -> tuple[tuple[str, ..
     for part in location:
         if isinstance(tree.value, dict) and str(part) in tree.value:
             tree = tree.value[str(part)]
-        elif isinstance(tree.value, list) and isinstance(part, int) and part < len(tree.value):
-            tree = tree.value[part]
+        elif isinstance(tree.value, list) and str(part).isdecimal() and int(part) < len(tree.value):
+            tree = tree.value[int(part)]
         else:
             continue
         path.append(str(part))
@@ -211,12 +210,7 @@ def _known_paths(model: type[BaseModel], path: tuple[str, ...]) -> Iterator[tupl
             yield from _known_paths(section, (*path, name))
 
 
-def _value_at(value: object, path: Sequence[str]) -> object:
+def _value_at(value: Any, path: Sequence[str]) -> Any:
     for name in path:
-        if isinstance(value, BaseModel):
-            value = getattr(value, name, None)
-        elif isinstance(value, (tuple, list)):
-            value = value[int(name)]
-        elif isinstance(value, dict):
-            value = value.get(name)
+        value = value[int(name)] if isinstance(value, (tuple, list)) else dict(value).get(name)
     return value
