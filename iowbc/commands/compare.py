@@ -293,16 +293,19 @@ def _steps_of(run: Run, stage: str) -> int | None:
     return int(flattened(made)[counted])
 
 
-def film_joint(store: Store, console: Console, runs: Sequence[Run], output: Path) -> Path | None:
-    """Film a trial that all evaluated runs share, unless there is a newer film; None where fewer than two were
-    evaluated. Raises `UsageError` where they share no trial, NoRenderer where nothing can be drawn."""
+def film_joint(store: Store, console: Console, runs: Sequence[Run], output: Path) -> None:
+    """Film a trial that all evaluated runs share, unless there is a newer film, and print its path or why there is
+    none; nothing where fewer than two were evaluated."""
     tried, film = _having(runs, TRIALS), output / FILM
     if len(tried) < 2:
-        return None
+        return
     newest = max((run.artifacts["eval"].folder / TRIALS).stat().st_mtime for run in tried)
-    if not (film.is_file() and film.stat().st_mtime > newest):
-        _film(store, console, tried, film)
-    return film
+    try:
+        if not (film.is_file() and film.stat().st_mtime > newest):
+            _film(store, console, tried, film)
+        tell(console, shown_path(film))
+    except UsageError as reason:
+        tell(console, f"no film: {reason}")
 
 
 def _film(store: Store, console: Console, tried: Sequence[Run], path: Path, quiet: bool = False) -> None:

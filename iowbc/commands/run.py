@@ -12,7 +12,7 @@ from rich.console import Console
 from iowbc.commands import options
 from iowbc.commands.compare import film_joint, write_comparison
 from iowbc.commands.plan import print_plan
-from iowbc.commands.printed import shown_path, stdout_console, tell
+from iowbc.commands.printed import stdout_console, tell
 from iowbc.commands.process import DONE, INTERRUPTED, STAGE_FAILED, RunEnding, ignoring_broken_outputs
 from iowbc.commands.request import Request, in_order, planners
 from iowbc.commands.results import main_tables, print_results
@@ -101,13 +101,7 @@ def compare_variants(request: Request, variants: Sequence[Run], console: Console
     output = request.runs.compared / name
     before = _report_of(output)
     write_comparison(store, variants, output, request.word)
-    try:
-        film = film_joint(store, console, variants, output)
-    except UsageError as reason:
-        film = None
-        tell(console, f"no film: {reason}")
-    if film is not None:
-        tell(console, shown_path(film))
+    film_joint(store, console, variants, output)
     report = _report_of(output)
     if report != before and track:
         files = [path for path in sorted(output.rglob("*")) if path.is_file()]
