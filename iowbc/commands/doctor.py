@@ -60,7 +60,6 @@ with Offscreen(model, width=64, height=64, distance=1.0, azimuth=0.0, elevation=
     picture.draw(mujoco.MjData(model))
 print(backend())
 """
-"""Draws a picture without a screen."""
 
 
 class Finding(NamedTuple):

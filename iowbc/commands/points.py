@@ -38,7 +38,6 @@ class PointRun:
 
     name: str
     log: Path
-    """File of its output."""
     run: Callable[..., RunEnding]
     """Runs it with a `console`, and one for `errors`."""
 

@@ -131,10 +131,8 @@ class Page:
             self._looked = now
             session.refresh()
         if panel.time.value != self._slid:
-            self._slid = panel.time.value
-            if not self.paused:
-                self.paused = True
-                panel.label_pause(True)
+            self._slid, self.paused = panel.time.value, True
+            panel.label_pause(True)
         if not self.paused and now >= self._due:
             panel.steer()
             session.drag(self.drawing.drags.now(self.drawing.away))

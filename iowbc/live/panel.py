@@ -30,7 +30,6 @@ LIGHTEST = 1.0
 STRONGEST_PUSH = 60.0
 """Largest push on the slider [N·s]: what speeds a robot of 35 kg up by 1.7 m/s."""
 LAST_SEED = 2**32 - 1
-"""Largest seed of an episode."""
 LABELS = {
     "v_x": "forward [m/s]",
     "v_y": "left [m/s]",

@@ -65,7 +65,6 @@ LIMITS = SafetyLimits()
 
 
 CHECKS = ("states", "model", "ankles", "mode", "publishers", "joints", "battery", "temperature", "policy")
-"""Names of the checks."""
 MODEL = 5
 """`mode_machine` of the G1 with 29 joints, revision 1.0, whose masses and gears the MJCF has."""
 PITCH_ROLL = 0

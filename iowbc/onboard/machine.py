@@ -29,7 +29,6 @@ class State(StrEnum):
     """States of a robot."""
 
     ZERO_TORQUE = "zero-torque"
-    """No torque."""
     DAMPING = "damping"
     """Velocity damping only."""
     STAND = "stand"

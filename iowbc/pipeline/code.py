@@ -80,8 +80,7 @@ def _imported(node: ast.AST) -> Iterator[str]:
 
 
 def _source(module: str) -> Path:
-    path = PACKAGE.joinpath(*module.split("."))
-    return path.with_name(f"{path.name}.py")
+    return PACKAGE / f"{module.replace('.', '/')}.py"
 
 
 @functools.cache

@@ -10,7 +10,6 @@ class _Missing:
 
 
 MISSING = _Missing()
-"""Placeholder for a missing value."""
 
 
 def nested(slices: Mapping[str, Any]) -> dict[str, Any]:

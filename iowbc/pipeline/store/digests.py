@@ -11,7 +11,6 @@ from typing import Any
 from iowbc.files import file_digest
 
 PACKAGE = Path(__file__).parents[2]
-"""Folder of this package."""
 
 
 def data_digest(data: Any) -> str:
