@@ -173,19 +173,16 @@ def new_journal(
 
 def unfinished_journal(runs: Runs, name: str, digest: str) -> Journal | None:
     """The newest journal of the same run if it is unfinished and its process is dead; reopened to continue."""
-    for path in sorted(runs.tracking.glob(f"*-{name}-*.jsonl"), reverse=True):
-        first = header(path)
-        if first.get("digest") != digest or first.get("uri") != tracking_uri():
-            continue
-        if statuses(path).get(PARENT) == "FINISHED":
-            return None
-        journal = Journal(path)
-        if journal.acquire(CHECKING_TIME):
-            journal.write("reopen", id=PARENT, tags=process_tags())
-            return journal
+    paths, same = runs.tracking.glob(f"*-{name}-*.jsonl"), {"digest": digest, "uri": tracking_uri()}
+    path = next((path for path in sorted(paths, reverse=True) if same.items() <= header(path).items()), None)
+    if path is None or statuses(path).get(PARENT) == "FINISHED":
+        return None
+    journal = Journal(path)
+    if not journal.acquire(CHECKING_TIME):
         journal.close()
         return None
-    return None
+    journal.write("reopen", id=PARENT, tags=process_tags())
+    return journal
 
 
 def sweep_record(runs: Runs, sweep: Sweep, execution: Execution) -> RunRecord:
