@@ -3,7 +3,7 @@
 from pydantic import Field
 
 from iowbc.recipe.section import LATER, Problems, Section
-from iowbc.recipe.simulation.randomization import Distribution, not_negative
+from iowbc.recipe.simulation.randomization import Distribution, NotNegative
 
 LONGEST_DELAY = 10.0
 """Longest delay that a recipe may draw [s]."""
@@ -48,17 +48,14 @@ class Leader(Section):
 class Stopping(Section):
     """A sudden stop of the partner."""
 
-    begin: Distribution = Distribution(low=2.0, high=10.0, nominal=5.0)
+    begin: NotNegative = Distribution(low=2.0, high=10.0, nominal=5.0)
     """Time of the stop in the episode [s]."""
-    duration: Distribution = Distribution(low=1.0, high=4.0, nominal=2.5)
+    duration: NotNegative = Distribution(low=1.0, high=4.0, nominal=2.5)
     """Time until the partner resumes [s]."""
     reverse: Distribution = Distribution(low=0.2, high=0.6, nominal=0.0, probability=0.5)
     """Backward speed during the stop relative to the commanded one; 0: stand still."""
     catching_up: float = Field(default=1.0, gt=0.0)
     """Time in which the partner returns to the handle after the stop [s]; otherwise it would hold back for ever."""
-
-    def problems(self) -> Problems:
-        yield from not_negative(self, "begin", "duration")
 
 
 OWN_DRAWS: dict[str, type[Section]] = {"leader": Leader, "stopping": Stopping}
@@ -94,15 +91,15 @@ class PartnerSettings(Section):
     """Fraction of a held object's weight that the partner bears; 0: no partner."""
     push_share: Distribution = Distribution(low=-0.3, high=0.6, nominal=0.0, probability=0.7)
     """Fraction of the rolling resistance that the partner overcomes in a push; negative: it resists, 0: no partner."""
-    share_drift: Distribution = Distribution(low=0.0, high=0.1, nominal=0.0)
+    share_drift: NotNegative = Distribution(low=0.0, high=0.1, nominal=0.0)
     """Standard deviation of the share's variation within an episode; nobody carries evenly."""
     drift_time: float = Field(default=3.0, gt=0.0)
     """Correlation time of that variation [s]; a few steps."""
-    stiffness: Distribution = Distribution(low=100.0, high=600.0, nominal=300.0, shape="log-uniform")
+    stiffness: NotNegative = Distribution(low=100.0, high=600.0, nominal=300.0, shape="log-uniform")
     """Stiffness at the handle, horizontal and vertical [N/m]; that of human arms."""
-    damping: Distribution = Distribution(low=20.0, high=100.0, nominal=50.0, shape="log-uniform")
+    damping: NotNegative = Distribution(low=20.0, high=100.0, nominal=50.0, shape="log-uniform")
     """Damping at the handle [N·s/m]."""
-    delay: Distribution = Distribution(low=0.05, high=0.3, nominal=0.15)
+    delay: NotNegative = Distribution(low=0.05, high=0.3, nominal=0.15)
     """Delay of the partner behind the commanded motion [s], up to 10; human reaction times."""
     behaviours: Behaviours = Field(default=Behaviours(), json_schema_extra=LATER)
     """Relative frequencies of the behaviours, drawn per episode."""
@@ -117,7 +114,7 @@ class PartnerSettings(Section):
     """Reaction of a lagging partner; evaluation only."""
     pace: Distribution = Distribution(low=0.7, high=1.2, nominal=1.0)
     """Speed of a path partner relative to the commanded one: below 1 it holds back, above 1 it pulls."""
-    noise: Distribution = Distribution(low=0.0, high=8.0, nominal=0.0)
+    noise: NotNegative = Distribution(low=0.0, high=8.0, nominal=0.0)
     """Standard deviation of the partner's random force, per horizontal axis [N]."""
     noise_resistance: float = Field(default=40.0, gt=0.0)
     """Rolling resistance at which the random force is as large in a push as in a lift [N]; the force in a push is
@@ -140,7 +137,6 @@ class PartnerSettings(Section):
     a force held over a control period would make a light object oscillate."""
 
     def problems(self) -> Problems:
-        yield from not_negative(self, "share_drift", "stiffness", "damping", "delay", "noise")
         if self.longest_delay > LONGEST_DELAY:
             yield "delay", f"should be 0 to {LONGEST_DELAY:g} s"
 

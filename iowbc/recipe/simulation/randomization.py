@@ -1,8 +1,8 @@
 """Domain randomization: quantities drawn per episode, and disturbances within one; ranges of the paper's Table I."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from iowbc.recipe.section import LATER, Interval, Problems, Section
 
@@ -25,14 +25,14 @@ class Distribution(Interval):
             yield "", f"a log-uniform range must be positive, got low {self.low}"
 
 
-def not_negative(section: Section, *names: str) -> Problems:
-    """Problems of a section whose distributions of these names have negative values."""
-    for name in names:
-        values = getattr(section, name)
-        if min(values.low, values.nominal) < 0.0:
-            yield name, "should be 0 or more"
+def _not_negative(values: Distribution) -> Distribution:
+    if min(values.low, values.nominal) < 0.0:
+        raise ValueError("should be 0 or more")
+    return values
 
 
+NotNegative = Annotated[Distribution, AfterValidator(_not_negative)]
+"""A distribution without negative values."""
 LATENCIES = ("action_latency", "sensor_latency", "object_latency")
 SIGNED = ("object_com_offset", "encoder_bias", "imu_tilt", "heading_drift", "gyro_bias", "start_yaw")
 """Quantities that may be negative."""
@@ -122,15 +122,12 @@ class Impulses(Section):
 
     enabled: bool = True
     """Enable impulses on the object."""
-    interval: Distribution = Distribution(low=1.5, high=4.0, nominal=3.0)
+    interval: NotNegative = Distribution(low=1.5, high=4.0, nominal=3.0)
     """Time from one impulse to the next [s]."""
-    magnitude: Distribution = Distribution(low=1.0, high=8.0, nominal=4.0)
+    magnitude: NotNegative = Distribution(low=1.0, high=8.0, nominal=4.0)
     """Magnitude [N·s]; 8 N·s stop a 7 kg box that moves at 1.1 m/s."""
     duration: float = Field(default=0.1, gt=0.0)
     """Duration of an impulse, a constant force [s]."""
-
-    def problems(self) -> Problems:
-        yield from not_negative(self, "interval", "magnitude")
 
 
 class Pushes(Section):
@@ -138,12 +135,9 @@ class Pushes(Section):
 
     enabled: bool = True
     """Enable pushes on the base."""
-    interval: Distribution = Distribution(low=2.0, high=5.0, nominal=4.0)
+    interval: NotNegative = Distribution(low=2.0, high=5.0, nominal=4.0)
     """Time from one push to the next [s]."""
-    speed: Distribution = Distribution(low=0.0, high=0.5, nominal=0.3)
+    speed: NotNegative = Distribution(low=0.0, high=0.5, nominal=0.3)
     """Velocity change that a push would give the free robot, in a random horizontal direction [m/s]."""
     duration: float = Field(default=0.1, gt=0.0)
     """Duration of a push, a constant force [s]."""
-
-    def problems(self) -> Problems:
-        yield from not_negative(self, "interval", "speed")
