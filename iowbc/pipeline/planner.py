@@ -14,8 +14,9 @@ from iowbc.pipeline.stage_plan import Options, StagePlan
 from iowbc.pipeline.stage_time import estimated
 from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.digests import data_digest, folder_digest
+from iowbc.pipeline.store.runs import read_record
 from iowbc.pipeline.store.store import Store
-from iowbc.pipeline.store.workspace import read_progress
+from iowbc.pipeline.store.workspace import PROGRESS, Progress
 from iowbc.recipe.reading.loading import SUFFIXES, LoadedRecipe, file_meant_in, load_recipe
 from iowbc.recipe.section import deciding
 
@@ -161,7 +162,8 @@ class Planner:
     def _with_resume_point(self, step: StagePlan) -> StagePlan:
         """The plan of a stage that runs, with the earlier attempt or the artifact of a shorter run to resume."""
         stage, notes, expected, predecessor = step.stage, list(step.notes), step.expected, None
-        record, forced = read_progress(self.store.runs.work / step.key), stage.name in self.options.force
+        record = read_record(Progress, self.store.runs.work / step.key / PROGRESS)
+        forced = stage.name in self.options.force
         if record and (record.forced or not forced):
             notes.append(", ".join(filter(None, [f"goes on from attempt {record.attempts or 1}", record.share])))
             if record.done and record.total and record.seconds:  # the remaining part at the attempt's rate

@@ -17,7 +17,7 @@ from iowbc.files import write_whole
 from iowbc.pipeline.console.wording import KEY_LENGTH
 from iowbc.pipeline.store.artifact import MANIFEST, RECIPE, Artifact
 from iowbc.pipeline.store.locks import lock_path, named_lock
-from iowbc.pipeline.store.runs import Runs, read_json
+from iowbc.pipeline.store.runs import Runs, read_json, read_record
 from iowbc.recipe.reading.loading import LoadedRecipe
 
 
@@ -49,7 +49,7 @@ def remember(runs: Runs, loaded: LoadedRecipe, artifact: Artifact) -> None:
     """
     stage, key, name = artifact.manifest.stage, artifact.manifest.key, loaded.recipe.name
     with named_lock(lock_path(runs, f"recipe-{name}")):
-        record = _record(runs, name)
+        record = read_record(LastUsed, record_path(runs, name))
         if record is None:  # where it is damaged, what it made counts as used now
             made = _keys(runs.store, name) if record_path(runs, name).exists() else []
             record = LastUsed(ever=dict.fromkeys(made, time.time()))
@@ -76,7 +76,7 @@ def ever_used(runs: Runs, recipe: str) -> dict[str, float]:
 
 def recall(runs: Runs, recipe: str) -> LastUsed:
     """The record of a recipe by name; empty where it never finished a stage. Raises `UsageError` where damaged."""
-    record = _record(runs, recipe)
+    record = read_record(LastUsed, record_path(runs, recipe))
     if record is None and record_path(runs, recipe).exists():
         raise UsageError(f"{record_path(runs, recipe)} is damaged; run the recipe again to remake it")
     return record or LastUsed()
@@ -109,7 +109,7 @@ def require_results(runs: Runs, artifact: Artifact) -> None:
 
 def _again(runs: Runs, artifact: Artifact, *options: str) -> str:
     made, words = artifact.manifest, ["iowbc", "run", str(artifact.folder / RECIPE)]
-    record = _record(runs, made.recipe)
+    record = read_record(LastUsed, record_path(runs, made.recipe))
     if record is not None and made.stage in record.stages and record.stages[made.stage].key == made.key:
         words[-1] = record.file or words[-1]
         words += [word for override in record.overrides for word in ("--set", override)]
@@ -150,14 +150,6 @@ def _with_key(stage: str, artifact: Path) -> str:
 
 def _only_links(folder: Path) -> bool:
     return folder.is_dir() and all(path.is_symlink() for path in folder.iterdir())
-
-
-def _record(runs: Runs, recipe: str) -> LastUsed | None:
-    """A readable record, or None."""
-    try:
-        return LastUsed.model_validate_json(record_path(runs, recipe).read_bytes())
-    except (OSError, ValueError):
-        return None
 
 
 def _keys(folder: Path, recipe: str) -> list[str]:

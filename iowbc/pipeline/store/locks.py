@@ -11,7 +11,7 @@ from typing import IO, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from iowbc.pipeline.store.runs import Runs
+from iowbc.pipeline.store.runs import Runs, read_record
 
 POLL = 0.2
 """Seconds between two attempts to take a lock that another process holds."""
@@ -42,7 +42,7 @@ def holder(runs: Runs, key: str) -> Holder | None:
     if not path.exists():
         return None
     with path.open("rb") as file:
-        return None if taken(file, fcntl.LOCK_SH) else _read(path)
+        return None if taken(file, fcntl.LOCK_SH) else read_record(Holder, path) or Holder()
 
 
 def taken(file: IO[Any], operation: int = fcntl.LOCK_EX) -> bool:
@@ -70,7 +70,7 @@ def key_lock(
                 yield False
                 return
             if not reported:
-                on_wait(_read(lock_path(runs, key)))
+                on_wait(read_record(Holder, lock_path(runs, key)) or Holder())
                 reported = True
             time.sleep(POLL)
         file.seek(0)
@@ -87,10 +87,3 @@ def named_lock(path: Path) -> Iterator[None]:
     with path.open("a") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
         yield
-
-
-def _read(path: Path) -> Holder:
-    try:
-        return Holder.model_validate_json(path.read_bytes())
-    except (OSError, ValueError):
-        return Holder()

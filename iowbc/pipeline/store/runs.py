@@ -5,10 +5,14 @@ import os
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
+
+from pydantic import BaseModel
 
 from iowbc.errors import RecipeError, UsageError
 from iowbc.recipe.reading.document import plain, read_document
+
+Model = TypeVar("Model", bound=BaseModel)
 
 
 class Runs:
@@ -46,6 +50,14 @@ class Runs:
         """MLflow's embedded database."""
         self.option = [] if root == Path("runs") else ["--runs", str(root)]
         """Words of a command that select this folder; none for the default."""
+
+
+def read_record(kind: type[Model], path: Path) -> Model | None:
+    """The record in a JSON file; None where it is missing, being written, or damaged."""
+    try:
+        return kind.model_validate_json(path.read_bytes())
+    except (OSError, ValueError):
+        return None
 
 
 def read_json(path: Path) -> dict[str, Any]:

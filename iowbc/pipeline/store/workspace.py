@@ -8,7 +8,7 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field
 
 from iowbc.files import write_whole
-from iowbc.pipeline.store.runs import Runs
+from iowbc.pipeline.store.runs import Runs, read_record
 
 PROGRESS = "progress.json"
 Number = Annotated[float, Field(strict=True, gt=-1e18, lt=1e18)]
@@ -66,7 +66,7 @@ class Workspace:
 
         A forced attempt continues only one that was forced too. `command`: what goes on with it when it is stopped.
         """
-        earlier = read_progress(self.root)
+        earlier = read_record(Progress, self.root / PROGRESS)
         if forced and not (earlier and earlier.forced):
             shutil.rmtree(self.root, ignore_errors=True)
             earlier = None
@@ -105,18 +105,10 @@ class Workspace:
         shutil.rmtree(self.root, ignore_errors=True)
 
 
-def read_progress(root: Path) -> Progress | None:
-    """The record of the last attempt in a work folder; None where that is missing or not as it was written."""
-    try:
-        return Progress.model_validate_json((root / PROGRESS).read_bytes())
-    except (OSError, ValueError):
-        return None
-
-
 def unfinished(runs: Runs) -> list[tuple[Path, Progress]]:
     """Work folders whose output is not in the store yet, and their records, newest first."""
     found = [
-        (path, read_progress(path) or Progress())
+        (path, read_record(Progress, path / PROGRESS) or Progress())
         for path in runs.work.glob("[!.]*")
         if path.is_dir() and ((path / "out").is_dir() or not any(runs.store.glob(f"*/{path.name}")))
     ]
