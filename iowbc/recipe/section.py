@@ -131,13 +131,11 @@ class Interval(Section):
             yield "", f"low ({self.low}) is above high ({self.high})"
 
 
-class NamedEntries(Section):
+class NamedEntries(Section, extra="allow"):
     """Mapping of names to entries of one type: built-in entries are fields, and a recipe may add custom ones.
 
     The type of custom entries is the annotation of `__pydantic_extra__`.
     """
-
-    model_config = ConfigDict(extra="allow")
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ValidationError
 
 from iowbc.errors import Damaged
 from iowbc.files import file_digest, synchronise, write_whole
@@ -23,19 +23,15 @@ BESIDE = (INGREDIENTS, RECIPE)
 """Files that are added to a stage's own."""
 
 
-class FileRecord(BaseModel):
+class FileRecord(BaseModel, frozen=True):
     """A file of an artifact."""
-
-    model_config = ConfigDict(frozen=True)
 
     sha256: str
     size: int
 
 
-class Manifest(BaseModel):
+class Manifest(BaseModel, frozen=True):
     """Description of an artifact, written last."""
-
-    model_config = ConfigDict(frozen=True)
 
     stage: str
     version: int

@@ -9,7 +9,7 @@ from pathlib import Path
 from socket import gethostname
 from typing import IO, Any
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, Field
 
 from iowbc.pipeline.store.runs import Runs, read_record
 
@@ -17,10 +17,8 @@ POLL = 0.2
 """Seconds between two attempts to take a lock that another process holds."""
 
 
-class Holder(BaseModel):
+class Holder(BaseModel, frozen=True):
     """Holder of a lock; its fields have defaults if the lock file is being written or unreadable."""
-
-    model_config = ConfigDict(frozen=True)
 
     pid: int = 0
     host: str = "?"

@@ -5,7 +5,7 @@ import time
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, Field
 
 from iowbc.files import write_whole
 from iowbc.pipeline.store.runs import Runs, read_record
@@ -17,10 +17,8 @@ WRITE_INTERVAL = 1.0
 """Seconds between two records of the progress on disk."""
 
 
-class Progress(BaseModel):
+class Progress(BaseModel, ser_json_inf_nan="constants"):
     """Record of a work folder; a number that was not recorded, or whose name a flipped bit changed, is 0."""
-
-    model_config = ConfigDict(ser_json_inf_nan="constants")
 
     stage: str = "?"
     recipe: str = "?"
