@@ -18,7 +18,7 @@ from iowbc.errors import Problem, RecipeError, shown
 from iowbc.recipe.reading.document import Located, plain, read_document, read_value
 from iowbc.recipe.reading.loading import LoadedRecipe, load_recipe, read_text
 from iowbc.recipe.reading.study import load_study
-from iowbc.recipe.reading.validation import descend
+from iowbc.recipe.reading.validation import descend, value_head
 from iowbc.recipe.recipe import NAME
 from iowbc.recipe.section import Interval, Problems, Section
 
@@ -245,7 +245,5 @@ def _read_file(file: Path) -> SweepFile:
 def _problem(tree: Located, location: Sequence[int | str], message: str) -> Problem:
     path, found = descend(tree, location)
     text = message.removeprefix("Value error, ").replace("Input should", "should").replace("Extra inputs", "other keys")
-    head = f"key '{'.'.join(path)}'" if path else "the sweep"
-    value = "" if isinstance(found.value, dict) else f" = {shown(plain(found))}"
-    missing = f" lacks '{location[-1]}'" if message == "Field required" else f"{value}: {text}"
-    return Problem(found.place, f"{head}{missing}")
+    end = f" lacks '{location[-1]}'" if message == "Field required" else f": {text}"
+    return Problem(found.place, f"{value_head(path, found, 'the sweep')}{end}")

@@ -101,13 +101,14 @@ def _each_problem(tree: Located, error: ErrorDetails) -> Iterator[tuple[str, str
     if isinstance(reason, InconsistentValues):
         for dotted, text in reason.problems:
             path, found = descend(tree, [*error["loc"], *dotted.split(".")])
-            yield found.place, _head(path, found), text
+            yield found.place, value_head(path, found), text
     else:
         yield _problem(tree, error)
 
 
-def _head(path: Sequence[str], found: Located) -> str:
-    head = f"key '{'.'.join(path)}'" if path else "the recipe"
+def value_head(path: Sequence[str], found: Located, whole: str = "the recipe") -> str:
+    """`key 'a.b' = value`, without the value of a section; `whole` for an empty path."""
+    head = f"key '{'.'.join(path)}'" if path else whole
     return head if isinstance(found.value, dict) else f"{head} = {shown(plain(found))}"
 
 
@@ -137,7 +138,7 @@ def _problem(tree: Located, error: ErrorDetails) -> tuple[str, str, str]:
         text = "should be text; in quotes, a word that reads as a number is"
     if error["type"] in ("literal_error", "enum") and isinstance(found.value, str):
         text += nearest(found.value, re.findall(r"'([^']*)'", str(error.get("ctx", {}).get("expected", ""))))
-    return found.place, _head(path, found), text
+    return found.place, value_head(path, found), text
 
 
 def _meant(path: Sequence[str]) -> str:
