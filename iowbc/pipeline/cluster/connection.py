@@ -15,11 +15,7 @@ from iowbc.processes import available_cores
 if TYPE_CHECKING:
     from iowbc.pipeline.cluster.cluster import Cluster
 
-SETTINGS = {
-    "RAY_USAGE_STATS_ENABLED": "0",
-    "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",
-    "RAY_worker_niceness": "0",
-}
+SETTINGS = {"RAY_USAGE_STATS_ENABLED": "0", "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0", "RAY_worker_niceness": "0"}
 """Environment variables of Ray: no telemetry, accelerator variables unchanged, and workers with the priority of a local
 run's."""
 LOCAL = "local"
