@@ -2,7 +2,6 @@
 
 import json
 import os
-import signal
 import subprocess
 import sys
 from typing import TYPE_CHECKING, Annotated
@@ -11,6 +10,7 @@ import typer
 
 from iowbc.commands import options
 from iowbc.commands.printed import stdout_console, tell
+from iowbc.commands.process import close_on_termination
 from iowbc.errors import UsageError
 from iowbc.pipeline.store.runs import Runs, require_writable_runs
 from iowbc.pipeline.tracking.delivery import URI_VARIABLE, embedded_uri, open_experiment, tracking_uri
@@ -39,7 +39,7 @@ def ui(
             f"those recorded in {runs.database}"
         )
     options.require_free(port)
-    signal.signal(signal.SIGTERM, signal.getsignal(signal.SIGINT))
+    close_on_termination()
     uri = embedded_uri(runs)
     mlflow, shown = opened(runs, uri)
     mlflow.set_experiment_tag(shown, f"mlflow.sharedViewState.{VIEW}", json.dumps(view()))
