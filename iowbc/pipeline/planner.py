@@ -196,14 +196,12 @@ class Planner:
 
     def _cosmetic_notes(self, stage: Stage, artifact: Artifact) -> Iterator[str]:
         """Notes on cosmetic values that differ from those an artifact was made with; it is used unchanged."""
+        if stage.name in self.options.force:
+            return
+        borrowed = {one.path for one in stage.borrows(self.loaded.recipe).values()}
         for path, old, new in differences(artifact.recipe, self.loaded.recipe.model_dump(mode="json")):
             of_stage = any(path == part or path.startswith(f"{part}.") for part in stage.slice)
-            if (
-                of_stage
-                and path not in {borrowed.path for borrowed in stage.borrows(self.loaded.recipe).values()}
-                and MISSING not in (old, new)
-                and stage.name not in self.options.force
-            ):
+            if of_stage and path not in borrowed and MISSING not in (old, new):
                 yield f"{path} is {shown(old)} in it; `--force {stage.name}` makes it with {shown(new)}"
 
     def _closest(self, stage: str, ingredients: Mapping[str, Any]) -> Artifact | None:
