@@ -242,8 +242,8 @@ def compliance_trials(recipe: Recipe) -> Iterator[Trial]:
     for share, mass, behaviour in itertools.product(asked.partner_shares, asked.masses, asked.behaviours):
         fixed = UNDISTURBED | {"partner_behaviour": float(BEHAVIOURS.index(behaviour)), "partner_share": share}
         suite = "compliance" if len(asked.partner_shares) == 1 else f"compliance with partner {share:g}"
-        place = ("compliance", suite, behaviour)
-        yield from _cell(recipe, place, asked.scene, mass, fixed, asked.sequence, trials=asked.trials)
+        cell = (recipe, ("compliance", suite, behaviour), asked.scene, mass, fixed)
+        yield from _cell(*cell, asked.sequence, trials=asked.trials)
     if asked.blocked is not None:
         yield from _case(recipe, "compliance", asked.blocked, False, asked.trials)
     pulls = asked.impedance

@@ -7,7 +7,7 @@ from pydantic import Field, PositiveFloat
 from iowbc.recipe.evaluation.sequences import BOWING, PROBED, STAGNATION, STANDING, WALKING, WALKING_ON, Segment
 from iowbc.recipe.section import Ascending, Distinct, Masses, Problems, Section
 from iowbc.recipe.simulation.holding import Held, ObjectScene
-from iowbc.recipe.simulation.partner import BEHAVIOURS
+from iowbc.recipe.simulation.partner import BEHAVIOURS, Behaviour
 
 SignedShare = Annotated[float, Field(ge=-1, le=1)]
 PartnerShare = SignedShare | None
@@ -48,7 +48,7 @@ class MassSweep(Section):
     """Heavier masses, for as long as one trial succeeds; empty: stop at the last mass."""
     rolling_resistance: float | None = Field(default=None, ge=0, le=1)
     """Rolling resistance μ of the crate's wheels; empty: drawn as in training."""
-    partner_shares: tuple[PartnerShare, ...] = Field(default=(0.0, 0.5), min_length=1)
+    partner_shares: Annotated[tuple[PartnerShare, ...], Distinct] = Field(default=(0.0, 0.5), min_length=1)
     """Nominal fractions of the weight (in pushing, of the rolling resistance) that the partner bears, besides the
     spring and damper of its hands; the sweep runs once for each. Negative: the partner resists; 0: the robot bears all;
     empty: drawn as in training."""
@@ -66,8 +66,6 @@ class MassSweep(Section):
         return self.model_copy(update={**given, "partner_shares": (share,), "with_share": ()})
 
     def problems(self) -> Problems:
-        if len(set(self.partner_shares)) != len(self.partner_shares):
-            yield "", f"partner_shares must differ, got {list(self.partner_shares)}"
         named = [one.partner_share for one in self.with_share]
         if len(set(named)) != len(named) or not set(named) <= set(self.partner_shares):
             yield "", f"with_share must name each of partner_shares once at most, got {named}"
@@ -266,7 +264,7 @@ class Compliance(Section):
     """Object masses [kg]."""
     partner_shares: Annotated[tuple[SignedShare, ...], Distinct] = Field(default=(0.5,), min_length=1)
     """Fractions of the weight that the partner bears."""
-    behaviours: Annotated[tuple[str, ...], Distinct] = ("path", "follower", "leader", "stopping", "tugging", "lagging")
+    behaviours: Annotated[tuple[Behaviour, ...], Distinct] = BEHAVIOURS
     """Partner behaviours, one case each; the last two never occur in training."""
     trials: int | None = Field(default=None, ge=1, le=10_000)
     """Trials of each case; empty: `eval.trials`."""
@@ -276,8 +274,3 @@ class Compliance(Section):
     """Push against an immovable crate; empty: none."""
     impedance: Impedance | None = Impedance()
     """Sinusoidal pulls; empty: none."""
-
-    def problems(self) -> Problems:
-        for name in self.behaviours:
-            if name not in BEHAVIOURS:
-                yield "", f"no partner behaviour {name!r}; valid: {', '.join(BEHAVIOURS)}"

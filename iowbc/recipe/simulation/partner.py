@@ -1,5 +1,7 @@
 """The simulated partner who carries or pushes at the object's far handle."""
 
+from typing import Literal, get_args
+
 from pydantic import Field
 
 from iowbc.recipe.section import LATER, Problems, Section
@@ -7,10 +9,11 @@ from iowbc.recipe.simulation.randomization import Distribution, NotNegative
 
 LONGEST_DELAY = 10.0
 """Longest delay that a recipe may draw [s]."""
-TRAINED = ("path", "follower", "leader", "stopping")
-"""Behaviours that training may draw."""
-BEHAVIOURS = (*TRAINED, "tugging", "lagging")
+Behaviour = Literal["path", "follower", "leader", "stopping", "tugging", "lagging"]
+BEHAVIOURS: tuple[Behaviour, ...] = get_args(Behaviour)
 """All behaviours; `partner_behaviour` is an index into this list. The last two are for evaluation only."""
+TRAINED = BEHAVIOURS[:-2]
+"""Behaviours that training may draw."""
 
 
 class Behaviours(Section):

@@ -20,7 +20,7 @@ from iowbc.recipe.section import (
     Share,
 )
 from iowbc.recipe.simulation.holding import ObjectScene
-from iowbc.recipe.simulation.partner import BEHAVIOURS
+from iowbc.recipe.simulation.partner import BEHAVIOURS, Behaviour
 from iowbc.recipe.skill.task import Tasks
 
 LARGEST_ROLLOUT = 1_000_000
@@ -87,7 +87,7 @@ Rival = Literal["nominal", "follow", "lead", "clock", "stand"]
 """Rules of `iowbc.skill.plan.Plan` that act without a skill."""
 
 
-PartnerKind = Literal["path", "follower", "leader", "stopping", "tugging", "lagging", "agent"]
+PartnerKind = Literal[Behaviour, "agent"]
 """Behaviours of scripted humans, and `agent` for the human driven by actions."""
 
 

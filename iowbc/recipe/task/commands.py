@@ -2,7 +2,7 @@
 
 from pydantic import Field
 
-from iowbc.recipe.section import Problems, Range, Section
+from iowbc.recipe.section import PositiveRange, Range, Section
 
 Vector = tuple[float, float, float]
 
@@ -80,11 +80,7 @@ class Commands(Section):
     stepping is worthwhile."""
     smallest_yaw_rate: float = Field(default=0.2, ge=0.0)
     """Smallest yaw rate of a turn on the spot [rad/s]; slower ones are raised to it, for the same reason."""
-    resampling: Range = (3.0, 7.0)
+    resampling: PositiveRange = (3.0, 7.0)
     """Time from one command to the next [s]."""
     rates: CommandRates = CommandRates()
     """Rate limits."""
-
-    def problems(self) -> Problems:
-        if self.resampling[0] <= 0.0:
-            yield "", f"resampling: {self.resampling[0]} s is no positive time"
