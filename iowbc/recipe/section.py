@@ -34,7 +34,7 @@ def in_order(ends: tuple[float, float]) -> tuple[float, float]:
     return ends
 
 
-def _ascending(values: tuple[float, ...]) -> tuple[float, ...]:
+def ascending(values: tuple[float, ...]) -> tuple[float, ...]:
     if any(low >= high for low, high in itertools.pairwise(values)):
         raise ValueError(f"must ascend without repetition, got {list(values)}")
     return values
@@ -48,9 +48,9 @@ def _distinct(values: tuple[Any, ...]) -> tuple[Any, ...]:
 
 Range = Annotated[tuple[float, float], AfterValidator(in_order)]
 """Lower and upper end."""
-Ascending = Annotated[tuple[PositiveFloat, ...], AfterValidator(_ascending), Field(min_length=1)]
+Ascending = Annotated[tuple[PositiveFloat, ...], AfterValidator(ascending), Field(min_length=1)]
 """Positive values that ascend without repetition."""
-Masses = Annotated[tuple[Annotated[float, Field(ge=0)], ...], AfterValidator(_ascending)]
+Masses = Annotated[tuple[Annotated[float, Field(ge=0)], ...], AfterValidator(ascending)]
 """Masses [kg] that ascend without repetition."""
 Distinct = AfterValidator(_distinct)
 """Marks tuples whose values must differ from each other."""

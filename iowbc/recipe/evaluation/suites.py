@@ -2,10 +2,10 @@
 
 from typing import Annotated, Literal, get_args
 
-from pydantic import Field, PositiveFloat
+from pydantic import AfterValidator, Field, PositiveFloat
 
 from iowbc.recipe.evaluation.sequences import BOWING, PROBED, STAGNATION, STANDING, WALKING, WALKING_ON, Segment
-from iowbc.recipe.section import Ascending, Distinct, Masses, Problems, Section
+from iowbc.recipe.section import Ascending, Distinct, Masses, Problems, Section, ascending
 from iowbc.recipe.simulation.holding import Held, ObjectScene
 from iowbc.recipe.simulation.partner import BEHAVIOURS, Behaviour
 
@@ -207,7 +207,7 @@ class Probe(Section):
 
     scene: ObjectScene = "lift"
     """Scene of `simulation.scenes`, with an object."""
-    masses: tuple[PositiveFloat, PositiveFloat] = (1.0, 10.0)
+    masses: Annotated[tuple[PositiveFloat, PositiveFloat], AfterValidator(ascending)] = (1.0, 10.0)
     """Lightest and heaviest object [kg]; the trials' masses are spread evenly between them. The default is the range of
     box masses in training."""
     trials: int = Field(default=180, ge=20, le=2000)
@@ -224,10 +224,6 @@ class Probe(Section):
     """Commands of a trial, in order; gentle, so that few end early."""
     interval: float = Field(default=0.5, gt=0)
     """Time between two samples [s]: the length of a history of 25 observations, so that samples share none."""
-
-    def problems(self) -> Problems:
-        if self.masses[0] >= self.masses[1]:
-            yield "", f"masses must be a lightest and a heavier one, got {list(self.masses)}"
 
 
 class Impedance(Section):
