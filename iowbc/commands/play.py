@@ -11,7 +11,7 @@ from rich.console import Console
 
 from iowbc.commands import completion, options
 from iowbc.commands.lookup import named, policy_of
-from iowbc.commands.playable import Planned, named_source, planned, playable_skill, skill_to_play, whole_source
+from iowbc.commands.playable import named_source, planned, playable_skill, skill_to_play, whole_source
 from iowbc.commands.printed import film_progress, stdout_console, tell
 from iowbc.commands.process import close_on_termination
 from iowbc.commands.results import evaluated_actor
@@ -21,6 +21,7 @@ from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.last_used import require_whole
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
+from iowbc.report.runs import Run
 
 if TYPE_CHECKING:
     from iowbc.evaluation.play import Source
@@ -173,9 +174,7 @@ def _play_game(
         tell(console, f"{game.ending.replace('_', ' ')} after {game.seconds:.1f} s{made}")
 
 
-def _driven(
-    store: Store, console: Console, word: str, stage: str | None, plan: Planned
-) -> "tuple[Source, Actor | None]":
+def _driven(store: Store, console: Console, word: str, stage: str | None, plan: Run) -> "tuple[Source, Actor | None]":
     """The policy to drive by hand, and the trials of its evaluation."""
     found: Mapping[str, Artifact] = {}
     if not os.path.isdir(word):

@@ -2,8 +2,6 @@
 
 import contextlib
 import os
-from collections.abc import Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,6 +23,7 @@ from iowbc.pipeline.store.workspace import unfinished
 from iowbc.recipe.evaluation.evaluation import Evaluation
 from iowbc.recipe.reading.loading import SUFFIXES, load_recipe
 from iowbc.recipe.recipe import Recipe
+from iowbc.report.runs import Run
 from iowbc.stages.inputs import policy_stage
 from iowbc.stages.registry import STAGES
 from iowbc.task.specification import Specification
@@ -36,31 +35,26 @@ if TYPE_CHECKING:
 
 SKILL = "skill"
 CHECKPOINT = Path("scratch", "training.checkpoint")
+UNPLANNED = Run("", {})
+"""What a key, a name or a folder plans: nothing."""
 
 
-@dataclass(frozen=True)
-class Planned:
-    """Recipe and cached artifacts of a recipe file that is played; empty for a key, a name or a folder."""
-
-    recipe: Recipe | None = None
-    artifacts: Mapping[str, Artifact] = field(default_factory=dict)
-    """Stored artifacts that its plan uses, by stage."""
-
-
-def planned(store: Store, word: str) -> Planned:
-    """The plan of a recipe's file. Raises `RecipeError` for one that is wrong."""
+def planned(store: Store, word: str) -> Run:
+    """The recipe of a file, and the stored artifacts that its plan uses; `UNPLANNED` for any other word. Raises
+    `RecipeError` for a file that is wrong."""
     if Path(word).suffix not in SUFFIXES or not os.path.isfile(word):
-        return Planned()
+        return UNPLANNED
     loaded = load_recipe(word)
     steps = prepared(loaded, store.runs, Options()).plan()
-    return Planned(loaded.recipe, {step.stage.name: step.artifact for step in steps if step.cached and step.artifact})
+    cached = {step.stage.name: step.artifact for step in steps if step.cached and step.artifact}
+    return Run(word, cached, loaded.recipe.model_dump(mode="json"))
 
 
-def skill_to_play(store: Store, word: str, stage: str | None, plan: Planned = Planned()) -> Artifact | None:
+def skill_to_play(store: Store, word: str, stage: str | None, plan: Run = UNPLANNED) -> Artifact | None:
     """The skill that a word and `--stage` name; None where they name no skill, or another stage."""
     if stage not in (None, SKILL) or os.path.isdir(word):
         return None
-    if plan.recipe is not None:
+    if plan.recipe:
         return plan.artifacts.get(SKILL)
     with contextlib.suppress(UsageError):  # a first training has nothing finished yet
         return named(store, word).usable.get(SKILL)
@@ -86,7 +80,7 @@ def playable_skill(store: Store, skill: Artifact, scene: str) -> "tuple[Specific
     return world, load_student(student.folder, world), robot, first[scene]
 
 
-def named_source(store: Store, console: Console, word: str, stage: str | None, plan: Planned) -> "Source":
+def named_source(store: Store, console: Console, word: str, stage: str | None, plan: Run) -> "Source":
     """The source that a word, with its plan, and `--stage` denote; prints a line if it is still in training. Raises
     `UsageError`.
 
@@ -110,8 +104,8 @@ def named_source(store: Store, console: Console, word: str, stage: str | None, p
         raise UsageError(f"{training}; {text}") from None
     if training:
         tell(console, f"{training}; this is a finished one")
-    known = {} if plan.recipe else recall(store.runs, word.partition("/")[0]).recipe
-    asked = plan.recipe.eval if plan.recipe else Evaluation.model_validate(known["eval"]) if "eval" in known else None
+    known = plan.recipe or recall(store.runs, word.partition("/")[0]).recipe
+    asked = Evaluation.model_validate(known["eval"]) if "eval" in known else None
     require_whole(store.runs, [artifact])
     if artifact.published:
         tell(console, f"{artifact.manifest.stage} of {artifact.manifest.recipe}, as it came with the repository")
@@ -156,7 +150,7 @@ def whole_source(store: Store, artifact: Artifact) -> "Source":
     return Source(world.deployed if student else world, artifact.folder)
 
 
-def playable(store: Store, word: str, stage: str | None, plan: Planned = Planned()) -> Artifact:
+def playable(store: Store, word: str, stage: str | None, plan: Run = UNPLANNED) -> Artifact:
     """The policy that a word and `--stage` name, before all one that its file plans to use. Raises `UsageError`."""
     leave = any(name in plan.artifacts for name in policy_stages())
     found = plan.artifacts if leave else named(store, word).usable

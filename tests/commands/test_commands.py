@@ -17,7 +17,7 @@ from sealing import sealed_anew
 
 from iowbc.commands.compare import compare, report
 from iowbc.commands.lookup import open_artifact, points_of
-from iowbc.commands.playable import Planned, named_source
+from iowbc.commands.playable import UNPLANNED, named_source
 from iowbc.errors import UsageError
 from iowbc.pipeline.store.artifact import write_manifest
 from iowbc.pipeline.store.runs import Runs
@@ -292,7 +292,7 @@ def test_what_is_damaged_is_neither_played_nor_compared_nor_reported(folder: Pat
         report(["second"], folder / "second.html", runs=folder / "runs")
     (folder / "runs" / "store" / "teacher" / key("second", "teacher") / "recipe.yaml").write_text("simulation: 3\n")
     with pytest.raises(UsageError, match=r"recipe\.yaml has 14 bytes.*to make it anew: iowbc run"):
-        named_source(store, console, "second/teacher", None, Planned())
+        named_source(store, console, "second/teacher", None, UNPLANNED)
 
 
 @pytest.mark.parametrize("stage", ["teacher", "rg-fit"])

@@ -15,7 +15,7 @@ from own_parts import own_part
 from rich.console import Console
 
 from iowbc.commands import printed
-from iowbc.commands.playable import Planned, in_training, named_source, planned, whole_source
+from iowbc.commands.playable import UNPLANNED, in_training, named_source, planned, whole_source
 from iowbc.commands.printed import film_progress
 from iowbc.errors import UsageError
 from iowbc.evaluation.play import requested_episode
@@ -54,7 +54,7 @@ def test_a_training_without_a_checkpoint_yet_is_told_in_one_sentence(folder: Pat
     store, console = Store(Runs(folder / "runs")), Console(file=io.StringIO())
     Workspace(store.runs, "teacher", "f" * 64).begin("third", False, {})
     with pytest.raises(UsageError, match=r"^teacher of third was interrupted; there is neither a checkpoint that can"):
-        named_source(store, console, "third/teacher", None, Planned())
+        named_source(store, console, "third/teacher", None, UNPLANNED)
     assert not console.file.getvalue()  # type: ignore[attr-defined]
 
 
