@@ -84,11 +84,6 @@ class Adapter:
     standing: float = 0.01
     """Commanded planar speed [m/s] and yaw rate [rad/s] up to which the robot stands."""
 
-    def bounds(self) -> Array:
-        """Minimum and maximum commanded velocities, (2, 3)."""
-        known = self.ranges or {}
-        return np.array([known.get(name, (-np.inf, np.inf)) for name in VELOCITIES]).T
-
     def observed(self, past: tuple[Array, ...]) -> Array:
         """Network input, (n, size), from the last values of each term, (n, history, size of the term) each."""
         rows = len(past[0])

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from iowbc.adapters.adapter import Adapter, Seen
+from iowbc.adapters.adapter import VELOCITIES, Adapter, Seen
 from iowbc.arrays import Array, Mask
 from iowbc.control.action import action_scale
 from iowbc.control.command import HEIGHT, PITCH, VELOCITY, YAW_RATE
@@ -34,7 +34,8 @@ class AdaptedPolicy:
         self._arms_hidden = controller.arms == "default"
         self._heading_gain = controller.heading_gain
         self._period = 1.0 / task.control_frequency
-        self._bounds = adapter.bounds()
+        ranges = adapter.ranges or {}
+        self._bounds = np.array([ranges.get(name, (-np.inf, np.inf)) for name in VELOCITIES]).T
         self._blank(0)
 
     def _blank(self, n: int) -> None:

@@ -49,9 +49,13 @@ class LowerLayer(Batch):
 
     def __init__(self, specification: Specification, student: Student, episodes: Sequence[Episode], block: int) -> None:
         """`block`: see `iowbc.rollouts.blocks`."""
-        setup = Setup(_with_strength(specification), len(episodes), 0, tuple(episodes))
+        recipe = specification.recipe
+        partner = recipe.simulation.partner.model_copy(update={"strongest": recipe.skill.human.strongest})
+        simulation = recipe.simulation.model_copy(update={"partner": partner})
+        world = replace(specification, recipe=recipe.model_copy(update={"simulation": simulation}))
+        setup = Setup(world, len(episodes), 0, tuple(episodes))
         super().__init__(setup, 0, setup.count, private_buffers(setup.buffer_fields(), setup.count))
-        self.wanted = np.tile(nominal_command(specification.recipe.task.commands), (self.n, 1))
+        self.wanted = np.tile(nominal_command(recipe.task.commands), (self.n, 1))
         """Commands that the robots approach, (n, 11)."""
         self.guidance.commander.steer(self.wanted)
         self.simulation.partner.steered[:] = True
@@ -93,10 +97,3 @@ class LowerLayer(Batch):
         self.dropped |= ending.dropped
         self.diverged |= ending.diverged
         self._observe(self.moved)
-
-
-def _with_strength(specification: Specification) -> Specification:
-    recipe = specification.recipe
-    partner = recipe.simulation.partner.model_copy(update={"strongest": recipe.skill.human.strongest})
-    simulation = recipe.simulation.model_copy(update={"partner": partner})
-    return replace(specification, recipe=recipe.model_copy(update={"simulation": simulation}))

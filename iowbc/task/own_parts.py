@@ -1,14 +1,14 @@
 """User-defined parts of s_priv. Their file is executed when a row is filled, not when a layout is read."""
 
 from collections.abc import Iterator
-from functools import cache
+from functools import cache, partial
 
 from iowbc.arrays import Array
 from iowbc.control.layout import Part
 from iowbc.errors import StageFailed
 from iowbc.recipe.task.task import CustomPart, Observation
 from iowbc.robot.mirror import in_place
-from iowbc.task.own_function import CheckedFunction, load_function
+from iowbc.task.own_function import load_function
 from iowbc.task.privileged import PRIVILEGED, Truth
 
 CONTRACT = (
@@ -46,10 +46,7 @@ def _part(name: str, said: CustomPart) -> Part[Truth]:
     either makes another observation."""
     unit = f"of {said.function} in {said.module.sha256[:12]}"
     frame = f"mirror {', '.join(map(str, said.mirror))}"
-
-    @cache
-    def function() -> CheckedFunction:  # executes the file at the first call
-        return load_function(_path(name), said, CONTRACT)
+    function = cache(partial(load_function, _path(name), said, CONTRACT))  # executes the file at the first call
 
     def value(truth: Truth) -> Array:
         return function()(truth, (len(truth.motor_effort), len(said.mirror)))

@@ -15,13 +15,8 @@ from iowbc.robot.description import load_robot
 from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv
 
-FIGURES = {
-    "survived": "survived",
-    "succeeded": "succeeded",
-    "transport_robot": "transport",
-    "weight_in_hands": "weight_in_hands",
-}
-"""Columns of the long table, and names of their means."""
+FIGURES = ("survived", "succeeded", "transport_robot", "weight_in_hands", *ERRORS, "upright")
+"""Columns that are averaged."""
 BY_LOAD = ("survived", "succeeded", *ERRORS)
 """Metrics that are also averaged per load."""
 
@@ -85,11 +80,8 @@ def figures(rows: Sequence[Mapping[str, Any]], check: Check) -> dict[str, float]
     1 / (1 + error / scale), which is 1 without error and 1/2 at its scale (`check.scales`). A trial that is not
     survived is also multiplied by `check.fall`.
     """
-    names = FIGURES | {name: name for name in (*ERRORS, "upright")}
-    columns = {name: np.array([row[name] for row in rows], np.float64) for name in names}
-    means = {
-        names[name]: float(np.nanmean(values)) if np.isfinite(values).any() else 0.0 for name, values in columns.items()
-    }
+    columns = {name.removesuffix("_robot"): np.array([row[name] for row in rows], np.float64) for name in FIGURES}
+    means = {name: float(np.nanmean(own)) if np.isfinite(own).any() else 0.0 for name, own in columns.items()}
     quality = [np.mean(1.0 / (1.0 + np.array([row[name] for name in ERRORS]) / check.scales)) for row in rows]
     lasted = [row["upright"] * (1.0 if row["survived"] else check.fall) for row in rows]
     score = np.mean([one * part for one, part in zip(quality, lasted, strict=True)])

@@ -56,8 +56,11 @@ class _Motions:
         raised = self.straight()
         raised[[7, 10]] = min(self._between(scripts.raised), self.commands.common_offset[2])
         back = self._walk(-self._between(scripts.backward), 0.0, 0.0)
-        side = self._walk(0.0, self._signed(scripts.sideways), 0.0)
-        turns = [self._walk(self._stepping(), 0.0, sign * self._between(scripts.turning)) for sign in (1.0, -1.0)]
+        side = self._walk(0.0, self._between(scripts.sideways) * (1.0 if next(self.numbers) < 0.5 else -1.0), 0.0)
+        turns = []
+        for sign in (1.0, -1.0):
+            forward = self._between(scripts.walking) * (next(self.numbers) < 0.5)  # on the spot in half of the turns
+            turns.append(self._walk(forward, 0.0, sign * self._between(scripts.turning)))
         crouch = self._stand(self._between(scripts.crouch), self._between((0.0, scripts.pitch[1])))
         return [raised, *turns, back, side, crouch, self._bow(), self._posture(self._stand())]
 
@@ -76,11 +79,6 @@ class _Motions:
     def straight(self) -> Array:
         """Straight forward walk."""
         return self._walk(self._between(self.scripts.walking), 0.0, 0.0)
-
-    def _stepping(self) -> float:
-        """Forward speed of a turn [m/s]; zero with probability 1/2."""
-        speed = self._between(self.scripts.walking)
-        return speed if next(self.numbers) < 0.5 else 0.0
 
     def _walk(self, forward: float, left: float, turn: float) -> Array:
         ranges = self.ranges
@@ -120,7 +118,3 @@ class _Motions:
     def _between(self, ends: Range) -> float:
         low, high = ends
         return low + (high - low) * next(self.numbers)
-
-    def _signed(self, ends: Range) -> float:
-        size = self._between(ends)
-        return size if next(self.numbers) < 0.5 else -size

@@ -24,7 +24,9 @@ def trial_row(recipe: Recipe, robot: Robot, trial: Trial, outcome: Outcome) -> d
     episode, fixed = trial.episode, trial.episode.fixed
     measured = trial_metrics(recipe, robot, episode, outcome)
     metrics = {name: float(np.float32(value)) for name, value in measured.items()} | {"seconds": outcome.seconds}
-    alive = outcome.survived
+    alive, drawn = outcome.survived, outcome.drawn
+    hold = float(drawn["ground_friction"][0]) * float(outcome.trace.foot_load.sum(axis=1).mean())
+    blocked = float(drawn["rolling_resistance"][0]) > hold  # the feet slip before a crate moves
     return {
         "variant": recipe.eval.label,
         "policy": recipe.eval.policy,
@@ -45,15 +47,12 @@ def trial_row(recipe: Recipe, robot: Robot, trial: Trial, outcome: Outcome) -> d
         "pull_direction": "" if episode.pull is None else episode.pull.direction,
         "rolling_resistance": fixed.get("object_ground_friction", np.nan),
         "survived": alive,
-        "succeeded": alive and succeeded(recipe.eval.success, trial.kind, metrics, blocked=_blocked(outcome)),
+        "succeeded": alive and succeeded(recipe.eval.success, trial.kind, metrics, blocked=blocked),
         "carried": metrics["weight_in_hands"] >= recipe.eval.success.weight_in_hands,
         "kept": metrics["object_beside"] <= recipe.eval.success.object_beside,
         "end": outcome.ending,
         **metrics,
-        **{
-            f"drawn_{name}": values.item() if len(values) == 1 else values.tolist()
-            for name, values in outcome.drawn.items()
-        },
+        **{f"drawn_{name}": own.item() if len(own) == 1 else own.tolist() for name, own in drawn.items()},
         "episode": json.dumps(episode.as_json()),
     }
 
@@ -95,10 +94,3 @@ def transported(asked: Success | Acceptance, metrics: dict[str, float], transpor
 def replayed(row: "pd.Series[Any]") -> Episode:
     """The episode of a row of the long table, for a replay."""
     return Episode.from_json(json.loads(row["episode"]))
-
-
-def _blocked(outcome: Outcome) -> bool:
-    """True if a crate's resistance exceeds the friction limit of the feet."""
-    drawn, trace = outcome.drawn, outcome.trace
-    hold = float(drawn["ground_friction"][0]) * float(trace.foot_load.sum(axis=1).mean())
-    return float(drawn["rolling_resistance"][0]) > hold

@@ -116,11 +116,9 @@ class Plant:
     def _connect(self, row: int) -> Any:
         """The connection of a hand and an object at a site of each."""
         model = self._model
-        places = [
-            (self.bodies[model.site_bodyid[site]], model.site_pos[site])
-            for site in (model.eq_obj1id[row], model.eq_obj2id[row])
-        ]
-        return self.tree.AddBallConstraint(*places[0], *places[1])
+        one, other = model.eq_obj1id[row], model.eq_obj2id[row]
+        first, second = self.bodies[model.site_bodyid[one]], self.bodies[model.site_bodyid[other]]
+        return self.tree.AddBallConstraint(first, model.site_pos[one], second, model.site_pos[other])
 
     def _add_shape(self, geom: int) -> list[Any]:
         """The geometries of a geom that touches anything. Drake has no torsional friction: a palm is a ring of spheres,

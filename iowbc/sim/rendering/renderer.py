@@ -28,26 +28,14 @@ class SceneRenderer(Offscreen):
     """Draws one environment of a simulation. Use as a context manager, or `close` it."""
 
     def __init__(
-        self,
-        simulation: Simulation,
-        env: int = 0,
-        *,
-        width: int = 640,
-        height: int = 480,
-        lines: Sequence[Line] = (),
+        self, simulation: Simulation, env: int = 0, *, width: int = 640, height: int = 480, lines: Sequence[Line] = ()
     ) -> None:
-        """See `Offscreen`."""
         self._simulation, self._env, self._lines = simulation, env, lines
         self._appearance = Appearance(simulation, env)
         forward = simulation.state.base_rotation[env, :, 0]
         azimuth = BESIDE + float(np.degrees(np.arctan2(forward[1], forward[0])))
         super().__init__(
-            self._appearance.model,
-            width=width,
-            height=height,
-            distance=DISTANCE,
-            azimuth=azimuth,
-            elevation=ELEVATION,
+            self._appearance.model, width=width, height=height, distance=DISTANCE, azimuth=azimuth, elevation=ELEVATION
         )
         self.camera.lookat[:] = self._aim()
 
