@@ -10,6 +10,7 @@ from iowbc.arrays import Array, Indices, Keys, Mask
 from iowbc.control.hand_forces import HandForces
 from iowbc.control.skill_observation import YAW, joined, of_object, robot_observation
 from iowbc.errors import UsageError, require_known
+from iowbc.evaluation.trials.plan import UNDISTURBED
 from iowbc.recipe.skill.skill import Skill
 from iowbc.recipe.skill.task import TransportTask
 from iowbc.robot.rotations import turned
@@ -31,8 +32,6 @@ from iowbc.task.vector.shared import Buffers, Fields
 
 NO_LIMIT = 1e6
 """Time limit of the lower layer's episodes [s]: the game ends them."""
-UNDISTURBED = {"impulse_scale": 0.0, "push_scale": 0.0}
-"""No random disturbances: the human is the disturbance."""
 CORNERS = np.array([[1.0, 1.0], [1.0, -1.0], [-1.0, -1.0], [-1.0, 1.0]])
 ROBOT_ACTIONS, HUMAN_ACTIONS = 11, 5
 
