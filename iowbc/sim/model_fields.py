@@ -27,15 +27,16 @@ class ModelFields:
     def __init__(self, batch: Any, layout: ModelIndex, scene: Scene, timing: Timing) -> None:
         self._layout, self._scene, self._timing = layout, scene, timing
         names = FIELDS + WHEELS * (scene.kind == "push")
-        self._fields = {name: batch.expand(name) for name in names}
-        self._nominal = {name: field[0].copy() for name, field in self._fields.items()}
-        self.body_mass: Array = self._fields["body_mass"]
+        self.arrays: dict[str, Array] = {name: batch.expand(name) for name in names}
+        """All fields that may differ."""
+        self._nominal = {name: field[0].copy() for name, field in self.arrays.items()}
+        self.body_mass: Array = self.arrays["body_mass"]
         """Inertial masses, (n, bodies) [kg]."""
-        self.object_mass = self._fields["object_mass"] = np.zeros(len(self.body_mass))
+        self.object_mass = self.arrays["object_mass"] = np.zeros(len(self.body_mass))
         """Gravitational mass, (n,) [kg]; the inertial one of a light object (`body_mass`) is larger."""
-        self.torque_range: Array = self._fields["actuator_forcerange"]
+        self.torque_range: Array = self.arrays["actuator_forcerange"]
         """Least and greatest torque of each motor, (n, joints, 2) [N·m]; to be written."""
-        self.rolling = [self._fields[name] for name in names if name in WHEELS]
+        self.rolling = [self.arrays[name] for name in names if name in WHEELS]
         """Of a crate's wheels in three directions, to be written: dry friction [N] and damping [N·s/m], (n, 3), and the
         directions, x, y and yaw of each, (n, 9)."""
         self._least_inertia = scene.object.smallest_inertia if scene.object is not None else 0.0
@@ -47,7 +48,7 @@ class ModelFields:
     def write(self, ids: Indices, drawn: Mapping[str, Array]) -> None:
         """Sets the models of simulations `ids`, in ascending order, from rows of drawn values in the same order."""
         links, speeds = self._layout.links, self._layout.joint_speeds
-        fields, nominal = self._fields, self._nominal
+        fields, nominal = self.arrays, self._nominal
         mass = drawn["link_mass_scale"]
         rows = ids if isinstance(links, slice) else ids[:, None]
         fields["body_mass"][rows, links] = nominal["body_mass"][links] * mass
@@ -71,7 +72,7 @@ class ModelFields:
             self._yielding[ids] = 1.0 / self.body_mass[ids, self._layout.object][:, None]
 
     def _write_object(self, ids: Indices, drawn: Mapping[str, Array]) -> None:
-        fields, thing = self._fields, self._layout.object
+        fields, thing = self.arrays, self._layout.object
         fields["object_mass"][ids] = drawn["object_mass"]
         mass = np.maximum(drawn["object_mass"], self._least_inertia)
         inertia = self._object_inertia * (mass * drawn["inertia_scale"])[:, None]
@@ -85,22 +86,13 @@ class ModelFields:
 
     def place_grips(self, ids: Indices, places: Array) -> None:
         """Sets the connection points of the grips on the object, (k, 2, 3), object frame [m]."""
-        self._fields["site_pos"][ids[:, None], self._layout.object_grips] = places
+        self.arrays["site_pos"][ids[:, None], self._layout.object_grips] = places
 
     def fit_width(self, ids: Indices, width: Array) -> None:
         """Makes the object as wide as the space between the palms, (k,) [m]."""
         geom = self._layout.object_geom
-        half = self._fields["geom_size"][ids, geom]
+        half = self.arrays["geom_size"][ids, geom]
         half[:, 1] = 0.5 * width
-        self._fields["geom_size"][ids, geom] = half
-        self._fields["geom_rbound"][ids, geom] = np.sqrt(np.sum(half * half, axis=1))
-        self._fields["geom_aabb"][ids, geom, 3:] = half
-
-    @property
-    def arrays(self) -> dict[str, Array]:
-        """All fields that may differ."""
-        return self._fields
-
-    def of(self, index: int) -> dict[str, Array]:
-        """Fields of one environment."""
-        return {name: field[index] for name, field in self._fields.items()}
+        self.arrays["geom_size"][ids, geom] = half
+        self.arrays["geom_rbound"][ids, geom] = np.sqrt(np.sum(half * half, axis=1))
+        self.arrays["geom_aabb"][ids, geom, 3:] = half

@@ -67,7 +67,7 @@ def _web_scene(world: Specification, robot: Robot, scene: Scene, name: str) -> d
     started, drawn = simulation.worlds[0], simulation.drawn
     layout, physics = started.layout, recipe.simulation.physics
     timing = Timing(simulation.period, physics.timestep, 0)
-    own = started.fields.of(0)  # after the start, for fields that differ between simulations
+    own = {each: field[0] for each, field in started.fields.arrays.items()}  # after the start
     described = {
         "kind": scene.kind,
         "xml": _plain(scene_spec(robot, physics, scene, timing, dressed=False)),

@@ -52,7 +52,7 @@ class Appearance:
         world, index, data = self._world, self._index, self.data
         data.qpos[:], data.qvel[:] = world.qpos[index], world.qvel[index]
         if world.layout.object_geom is not None:
-            self.model.geom("object").size[:] = world.fields.of(index)["geom_size"][world.layout.object_geom]
+            self.model.geom("object").size[:] = world.fields.arrays["geom_size"][index, world.layout.object_geom]
         mujoco.mj_kinematics(self.model, data)
         mujoco.mj_comPos(self.model, data)
         mujoco.mj_camlight(self.model, data)
