@@ -23,9 +23,10 @@ def block_size(environments: int) -> int:
     return max(1, min(LARGEST, environments // FEWEST))
 
 
-def shares_in_blocks(environments: int, parts: int) -> list[tuple[int, int]]:
-    """First and last environment (excluded) of nearly equal groups of whole blocks; at most `parts` groups."""
-    size = block_size(environments)
+def shares_in_blocks(environments: int, parts: int, size: int | None = None) -> list[tuple[int, int]]:
+    """First and last environment (excluded) of nearly equal groups of whole blocks, at most `parts`; `size` of a block,
+    by default that of `block_size`."""
+    size = size or block_size(environments)
     blocks = -(-environments // size)
     parts = min(parts, blocks)
     ends = [min(round(part * blocks / parts) * size, environments) for part in range(parts + 1)]

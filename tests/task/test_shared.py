@@ -5,7 +5,7 @@ import os
 import numpy as np
 import pytest
 
-from iowbc.task.vector.setup import shares
+from iowbc.rollouts.blocks import shares_in_blocks
 from iowbc.task.vector.shared import attach_shared, create_shared, private_buffers
 
 FIELDS = {"action": ((3,), "float32"), "done": ((), "bool"), "sum": ((2, 2), "float64")}
@@ -38,7 +38,7 @@ def test_fields_do_not_overlap_and_rows_are_views() -> None:
 
 @pytest.mark.parametrize(("count", "parts"), [(7, 3), (8, 2), (3, 3), (100, 7)])
 def test_environments_are_shared_out_evenly_and_completely(count: int, parts: int) -> None:
-    groups = shares(count, parts)
+    groups = shares_in_blocks(count, parts, 1)
     assert [group[0] for group in groups[1:]] == [group[1] for group in groups[:-1]]
     assert (groups[0][0], groups[-1][1]) == (0, count)
     sizes = [last - first for first, last in groups]

@@ -18,9 +18,9 @@ from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.scene_names import with_scenes
 from iowbc.recipe.task.joint_references import Grasps, Loads
 from iowbc.robot.description import load_robot
+from iowbc.rollouts.blocks import shares_in_blocks
 from iowbc.task.layout import full_layout
 from iowbc.task.specification import Specification
-from iowbc.task.vector.setup import shares
 
 
 def evaluated_world(specification: Specification) -> Specification:
@@ -173,7 +173,7 @@ def batched_by_duration(trials: Sequence[Trial], size: int) -> Iterator[list[Tri
     durations = [round(trial.episode.duration, 3) for trial in trials]
     for duration in sorted(set(durations)):
         alike = [trial for trial, own in zip(trials, durations, strict=True) if own == duration]
-        for first, last in shares(len(alike), math.ceil(len(alike) / size)):
+        for first, last in shares_in_blocks(len(alike), math.ceil(len(alike) / size), 1):
             yield alike[first:last]
 
 

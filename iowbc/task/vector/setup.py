@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -68,11 +67,6 @@ class Setup:
     def batch(self, first: int, last: int, buffers: Buffers) -> Batch:
         """The environments from `first` to `last`, the latter excluded."""
         return Batch(self, first, last, buffers)
-
-
-def shares(count: int, parts: int) -> list[tuple[int, int]]:
-    """First and last environment (excluded) of each of `parts` nearly equal groups."""
-    return list(pairwise(round(part * count / parts) for part in range(parts + 1)))
 
 
 def scene_of(count: int, shares: Iterable[tuple[str, float]]) -> list[str]:
