@@ -2,7 +2,8 @@
 
 import copy
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from itertools import accumulate
 from typing import Any, Self
 
 import numpy as np
@@ -24,6 +25,12 @@ def as_slice(indices: Indices) -> slice | Indices:
     if not len(indices) or len(steps) != 1 or steps[0] < 1:
         return indices
     return slice(int(indices[0]), int(indices[-1]) + 1, int(steps[0]))
+
+
+def places(sizes: Mapping[str, int]) -> dict[str, slice]:
+    """Places of named parts that follow one another, from their sizes."""
+    ends = accumulate(sizes.values())
+    return {name: slice(end - size, end) for (name, size), end in zip(sizes.items(), ends, strict=True)}
 
 
 def namespace(array: Any) -> Any:

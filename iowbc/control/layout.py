@@ -3,12 +3,12 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import pairwise
 from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from iowbc.arrays import places
 from iowbc.robot.description import Robot
 from iowbc.robot.mirror import Kind, MirrorMap, side_by_side
 
@@ -59,8 +59,7 @@ class Layout(Generic[Source]):
 
     @cached_property
     def slices(self) -> dict[str, slice]:
-        ends = np.cumsum([0, *map(len, self.mirrors)]).tolist()
-        return {name: slice(*place) for name, place in zip(self.names, pairwise(ends), strict=True)}
+        return places(dict(zip(self.names, map(len, self.mirrors), strict=True)))
 
     def describe(self) -> list[dict[str, Any]]:
         """Name, size, unit and frame of the parts, in order, for JSON."""

@@ -6,12 +6,11 @@ simulation computes the same equations with its own state (`iowbc.task.guidance`
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Annotated, Any, get_type_hints
 
 import numpy as np
 
-from iowbc.arrays import Array, Constants, namespace
+from iowbc.arrays import Array, Constants, namespace, places
 from iowbc.control import gait
 from iowbc.control.action import action_scale
 from iowbc.control.command import COMMAND, YAW_RATE, approach, rate_limits
@@ -156,8 +155,7 @@ class ControlStep(Constants):
 
     def unpacked(self, rows: Array) -> State:
         """The state of rows (n, size)."""
-        ends = np.cumsum([0, *self.sizes.values()]).tolist()
-        parts = [rows[:, start:end] for start, end in pairwise(ends)]
+        parts = [rows[:, place] for place in places(self.sizes).values()]
         return State(*(part.reshape(-1, *shape) for part, shape in zip(parts, self.shapes.values(), strict=True)))
 
     @property

@@ -13,7 +13,7 @@ import numpy as np
 import onnxruntime
 from numpy.typing import NDArray
 
-from iowbc.arrays import Array, Mask
+from iowbc.arrays import Array, Mask, places
 from iowbc.control.command import HEIGHT
 from iowbc.control.references import both_wrists
 from iowbc.control.sensors import Measured
@@ -98,10 +98,7 @@ class Controller:
         self._scene = {name: np.zeros(shapes[name], np.float32) for name in ("grasp", "load")}
         self._state = np.zeros(shapes["state"], np.float32)
         self._starts: Mask = np.ones(robots, np.bool_)
-        ends = np.cumsum([math.prod(part.shape) for part in contract.state]).tolist()
-        self._places = {
-            part.name: slice(end - math.prod(part.shape), end) for part, end in zip(contract.state, ends, strict=True)
-        }
+        self._places = places({part.name: math.prod(part.shape) for part in contract.state})
         self.reset(scene="lift")
 
     @classmethod

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from iowbc import counter_random as random
-from iowbc.arrays import Array, Indices, Keys
+from iowbc.arrays import Array, Indices, Keys, places
 from iowbc.recipe.simulation.holding import BY_AXIS, SWITCHES
 from iowbc.recipe.simulation.partner import PartnerSettings
 from iowbc.recipe.simulation.randomization import Distribution
@@ -32,9 +32,7 @@ class DrawTable:
     def __init__(self, entries: Mapping[str, tuple[Distribution, int]]) -> None:
         """`entries`: distribution and width of each quantity by name."""
         widths = [width for _, width in entries.values()]
-        ends = np.cumsum(widths).tolist()
-        self.width = ends[-1]
-        self.columns = {name: slice(end - width, end) for name, end, width in zip(entries, ends, widths, strict=True)}
+        self.width, self.columns = sum(widths), places(dict(zip(entries, widths, strict=True)))
         kinds = [distribution for distribution, _ in entries.values()]
         off = np.array([not kind.enabled for kind in kinds])
         nominal = np.array([kind.nominal for kind in kinds])
@@ -59,8 +57,8 @@ class DrawTable:
 
     def views(self, rows: Array) -> dict[str, Array]:
         """The quantities in rows (n, width), by name, (n,) or (n, k)."""
-        places = self.columns.items()
-        return {name: rows[:, at.start] if at.stop - at.start == 1 else rows[:, at] for name, at in places}
+        columns = self.columns.items()
+        return {name: rows[:, at.start] if at.stop - at.start == 1 else rows[:, at] for name, at in columns}
 
 
 class Draws:
@@ -93,8 +91,7 @@ class Draws:
         self.values |= {name: self._rows[:, first + place] for place, name in enumerate(BY_AXIS)}
         self.values["object_mass"] = self._nominal_mass.copy()
         self.values["slip_force"] = self._strength.copy()
-        self.values["rolling_resistance"] = np.zeros(n)
-        self.values["grip_shift"] = np.zeros(n)
+        self.values |= {"rolling_resistance": np.zeros(n), "grip_shift": np.zeros(n)}
         self._far = np.array([measured(scene.object).high[0] if scene.object else 0.0 for scene in scenes])
         self._near = self._far * [scene.grasp.near_end * (scene.kind == "lift") for scene in scenes]
         self._lightest = recipe.randomization.object_mass_scale.low
@@ -157,7 +154,7 @@ class Draws:
 
 
 def _entries(recipe: Recipe, robot: Robot) -> dict[str, tuple[Distribution, int]]:
-    randomization, partner = recipe.randomization, recipe.partner
+    randomization, partner, off = recipe.randomization, recipe.partner, {"enabled": False}
     links = len(robot.tree.bodies)
     widths = {"object_com_offset": 3, "link_mass_scale": links, "link_inertia_scale": links}
     widths |= {"linkage_effort": len(robot.linkages), "imu_tilt": 2, "gyro_bias": 3}
@@ -165,7 +162,7 @@ def _entries(recipe: Recipe, robot: Robot) -> dict[str, tuple[Distribution, int]
     widths |= dict.fromkeys(each, len(robot.joints))
     entries = {name: (value, widths.get(name, 1)) for name, value in randomization if isinstance(value, Distribution)}
     if not randomization.enabled:
-        entries = {name: (_off(value), width) for name, (value, width) in entries.items()}
+        entries = {name: (value.model_copy(update=off), width) for name, (value, width) in entries.items()}
     shares = {"partner_share": partner.share, PUSH_SHARE: partner.push_share}
     absent = Distribution(low=0.0, high=0.0, nominal=0.0)
     entries |= {name: (value if partner.enabled else absent, 1) for name, value in shares.items()}
@@ -183,7 +180,3 @@ def _behaviour_distributions(partner: PartnerSettings) -> dict[str, tuple[Distri
         for name, value in habits
         if isinstance(value, Distribution)
     }
-
-
-def _off(distribution: Distribution) -> Distribution:
-    return distribution.model_copy(update={"enabled": False})

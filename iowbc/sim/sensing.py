@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from iowbc.arrays import Array, Indices, Mask
+from iowbc.arrays import Array, Indices, Mask, places
 from iowbc.control.sensors import Measured
 from iowbc.recipe.simulation.simulation import SensorNoise as Recipe
 from iowbc.robot import rotations
@@ -24,9 +24,8 @@ class Sensing:
         n, self._period = len(has_object), period
         quantities = _quantities(recipe, joints)
         sizes, deviations = zip(*quantities.values(), strict=True)
-        ends = np.cumsum(sizes).tolist()
-        columns = {name: slice(end - size, end) for name, size, end in zip(quantities, sizes, ends, strict=True)}
-        self.noise_width = ends[-1]
+        columns = places(dict(zip(quantities, sizes, strict=True)))
+        self.noise_width = sum(sizes)
         """Noise columns that sensing uses per step."""
         self._width = width = columns["heading"].stop
         """Columns of the robot's own quantities; those of the object come last."""
