@@ -57,16 +57,8 @@ def defaults(recipe: Recipe) -> dict[str, object]:
 
 def run(job: Job) -> None:
     """Play all trials; leave `trials.parquet`, `probe.parquet`, tables, figures, films and a summary."""
-    import torch
-
-    from iowbc.evaluation.trials.protocol import evaluated_policy, evaluated_world
-    from iowbc.task.specification import Specification
-
-    torch.set_num_threads(1)  # the result must not depend on the machine's cores, and the policy is small
-    recipe = job.recipe
-    world = evaluated_world(Specification(recipe, job.robot, job.inputs.get("rg-fit")))
-    policy = evaluated_policy(world, read_by_trials(job).get("policy"))
-    metrics: dict[str, float] = {}
+    recipe, metrics = job.recipe, dict[str, float]()
+    world, policy = world_and_policy(recipe, **read_by_trials(job))
     try:
         if recipe.eval.measured:
             metrics |= measure(job, world, policy)
@@ -156,18 +148,25 @@ def play_everywhere(
         yield names[place], content
 
 
-def play_batch(
-    recipe: Recipe, trials: "Sequence[Trial]", *, robot: Path, policy: Path | None = None, generator: Path | None = None
-) -> bytes:
+def play_batch(recipe: Recipe, trials: "Sequence[Trial]", **folders: Path) -> bytes:
     """Play one batch; its file."""
+    from iowbc.evaluation.trials.protocol import played
+
+    return played(*world_and_policy(recipe, **folders), trials, workers=0)
+
+
+def world_and_policy(
+    recipe: Recipe, *, robot: Path, policy: Path | None = None, generator: Path | None = None
+) -> "tuple[Specification, Policy]":
+    """The world of the trials and the policy that acts in it; from now on torch uses one thread."""
     import torch
 
-    from iowbc.evaluation.trials.protocol import evaluated_policy, evaluated_world, played
+    from iowbc.evaluation.trials.protocol import evaluated_policy, evaluated_world
     from iowbc.task.specification import Specification
 
-    torch.set_num_threads(1)  # as in the stage
+    torch.set_num_threads(1)  # the result must not depend on the machine's cores, and the policy is small
     world = evaluated_world(Specification(recipe, robot, generator))
-    return played(world, evaluated_policy(world, policy), trials, workers=0)
+    return world, evaluated_policy(world, policy)
 
 
 def headline(summary: "pd.DataFrame") -> dict[str, float]:
