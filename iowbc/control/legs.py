@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from iowbc.arrays import Array, Constants, namespace
-from iowbc.robot import rotations
 from iowbc.robot.description import Robot
 from iowbc.robot.mjcf import Hinge
 
@@ -67,18 +66,14 @@ def leg_geometry(robot: Robot) -> Legs:
 
 def _vectors(robot: Robot, sole_body: str, sole: str) -> dict[str, Array]:
     """Vectors of one leg, by the names of `Legs`, (3,) each; `side`: the sole's centre from the base."""
-    place, direction = [], []
-    position, rotation = np.zeros(3), np.eye(3)
-    for body in robot.tree.chain(sole_body, robot.base):
-        position = position + rotation @ body.position
-        rotation = rotation @ rotations.matrix(body.quaternion)
-        if body.hinge is not None:
-            place.append(position)
-            direction.append(rotation @ body.hinge.axis)
-    end = robot.tree.forward(dict.fromkeys(robot.joints, 0.0), robot.base, sole)[0]
-    hip, roll, yaw, knee, ankle, ankle_roll = place
+    tree, zero = robot.tree, dict.fromkeys(robot.joints, 0.0)
+    chain = [body for body in tree.chain(sole_body, robot.base) if body.hinge is not None]
+    poses = [tree.pose(zero, robot.base, body.name) for body in chain]
+    tilt = poses[2][1] @ tree.hinges_between(sole_body, robot.base)[2].axis
+    end = tree.forward(zero, robot.base, sole)[0]
+    hip, roll, yaw, knee, ankle, ankle_roll = (position for position, _ in poses)
     vectors = {"side": end, "hip": hip, "thigh": knee - hip, "shank": ankle - knee, "sole": end - ankle}
-    return vectors | {"roll": roll - hip, "yaw": yaw - hip, "tilt": direction[2], "ankle_roll": ankle_roll - end}
+    return vectors | {"roll": roll - hip, "yaw": yaw - hip, "tilt": tilt, "ankle_roll": ankle_roll - end}
 
 
 def _axis(hinge: Hinge) -> str:
