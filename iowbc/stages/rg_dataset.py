@@ -141,14 +141,7 @@ def label_everywhere(
             ready += len(chunks[number])
         progress(ready, len(indices))
     return label_all(
-        task,
-        indices,
-        folder=folder,
-        key=key,
-        chunk_size=chunk_size,
-        workers=1,
-        interrupted=interrupted,
-        progress=progress,
+        task, indices, folder=folder, key=key, chunk_size=chunk_size, interrupted=interrupted, progress=progress
     )
 
 
@@ -159,16 +152,8 @@ def label_share(
     from iowbc.reference.labels.pool import label_all
 
     with tempfile.TemporaryDirectory(prefix="iowbc-labels-") as folder:
-        label_all(
-            replace(task, robot=robot),
-            [index for chunk in chunks for index in chunk],  # only the last may be short: cut again, they are equal
-            folder=Path(folder),
-            key=key,
-            chunk_size=chunk_size,
-            workers=1,
-            interrupted=lambda: False,
-            progress=lambda done, total: None,
-        )
+        indices = [index for chunk in chunks for index in chunk]  # cut again they are equal: only the last is short
+        label_all(replace(task, robot=robot), indices, folder=Path(folder), key=key, chunk_size=chunk_size)
         return [path.read_bytes() for path in sorted(Path(folder).glob("*.shard"))]
 
 

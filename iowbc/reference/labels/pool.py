@@ -62,9 +62,9 @@ def label_all(
     folder: Path,
     key: str,
     chunk_size: int,
-    workers: int,
-    interrupted: Callable[[], bool],
-    progress: Callable[[int, int], None],
+    workers: int = 1,
+    interrupted: Callable[[], bool] = lambda: False,
+    progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Shard:
     """Labels the samples with these numbers. The result does not depend on the number of workers.
 
