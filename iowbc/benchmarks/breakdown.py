@@ -82,8 +82,7 @@ def transfer_time(workers: Workers, rounds: int) -> float:
     for _ in range(rounds):
         begin = time.perf_counter()
         workers.buffers["action"][:] = 0.0
-        workers.ask([Message(Batch.levels, changes=False) for _ in workers.groups])
-        workers.answers()
+        workers.call([Message(Batch.levels, changes=False) for _ in workers.groups])
         for name in ("observation", "reward", "done"):
             workers.buffers[name].copy()
         times.append(time.perf_counter() - begin)

@@ -106,13 +106,13 @@ class TransportGame:
         """Starts the first episode of every game, the same each time, or that of the seeds (n,) uint64. `agent_share`:
         fraction of the sampled episodes from now on in which the human agent acts."""
         own = [None if seeds is None else seeds[first:last] for first, last in self._workers.groups]
-        self._ask([Message(GameBatch.reset, (part, agent_share)) for part in own])
+        self._workers.call([Message(GameBatch.reset, (part, agent_share)) for part in own])
         return self._observed("now")
 
     def step(self, actions: Mapping[str, Array]) -> GameOutcome:
         """One decision; actions by agent, (n, k) in [-1, 1]. Raises ValueError if not finite or of another shape."""
         self.act(actions)
-        self._ask([Message(GameBatch.step)] * len(self._workers.groups))
+        self._workers.call([Message(GameBatch.step)] * len(self._workers.groups))
         return self.outcome()
 
     def act(self, actions: Mapping[str, Array]) -> None:
@@ -125,7 +125,6 @@ class TransportGame:
             buffer[:] = given
 
     def outcome(self) -> GameOutcome:
-        """Result of the last decision."""
         reward, terminated, truncated = (self._buffers[name].copy() for name in ("reward", "terminated", "truncated"))
         figures = self._figures(np.flatnonzero(terminated | truncated))
         return GameOutcome(self._observed("now"), reward, terminated, truncated, self._observed("final"), figures)
@@ -143,10 +142,6 @@ class TransportGame:
         names = {"task": list(self.setup.tasks), "partner": list(KINDS)}
         values |= {name: np.array(known, object)[values[name].astype(np.int64)] for name, known in names.items()}
         return values | {name: values[name].astype(np.int64) for name in ("environment", "episode")}
-
-    def _ask(self, messages: Sequence[Message]) -> None:
-        self._workers.ask(messages)
-        self._workers.answers()
 
 
 def play_once(

@@ -99,5 +99,5 @@ def test_a_worker_that_makes_steps_does_not_count_as_hung(make: Make, monkeypatc
     assert workers._steps() == 3 * 2
     workers.answers()
     monkeypatch.setattr(workers, "_steps", itertools.count().__next__)
-    env._call([StepBy(functools.partial(time.sleep, 1.6))])
+    env.workers.call([StepBy(functools.partial(time.sleep, 1.6))])
     env.step(np.zeros((2, 15)))

@@ -92,7 +92,7 @@ def test_an_exception_in_a_worker_arrives_with_its_traceback(make: Make) -> None
     env = make(num_envs=2, workers=1)
     env.reset()
     processes = processes_of(env)
-    env._call([StepBy(functools.partial(operator.truediv, 1, 0))])
+    env.workers.call([StepBy(functools.partial(operator.truediv, 1, 0))])
     with pytest.raises(WorkerFailed, match=r"(?s)worker 0 .*Traceback.*ZeroDivisionError"):
         env.step(actions(0, 2))
     assert gone(processes)
@@ -107,7 +107,7 @@ def test_a_hung_worker_is_noticed_and_says_where_it_hangs(make: Make) -> None:
     env = make(num_envs=4, workers=2, patience=1.0)
     env.reset()
     processes = processes_of(env)
-    env._call([StepBy(functools.partial(time.sleep, 3600.0))] * 2)
+    env.workers.call([StepBy(functools.partial(time.sleep, 3600.0))] * 2)
     with pytest.raises(WorkerFailed, match=r"(?s)has not answered for 1 s.*in _serve"):
         env.step(actions(0, 4))
     assert gone(processes)

@@ -96,7 +96,7 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
         """Starts an episode in every environment; after a call of `seed`, with those seeds."""
         seeds = None if self._seeds[0] is None else np.array(self._seeds, np.uint64)
         parts = [None if seeds is None else seeds[first:last] for first, last in self.workers.groups]
-        self._call([Message(Batch.reset, (part,)) for part in parts])
+        self.workers.call([Message(Batch.reset, (part,)) for part in parts])
         self._reset_seeds()
         self._reset_options()
         return self._buffers["observation"].copy()
@@ -125,7 +125,7 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
     def roll(self, rollout_policy: RolloutPolicy, steps: int) -> Trajectories:
         """Runs a rollout of some control steps, with one message to each worker; the same whatever their number."""
         messages = [Message(roll, (rollout_policy.part(*group), steps)) for group in self.workers.groups]
-        return side_by_side(self._call(messages))
+        return side_by_side(self.workers.call(messages))
 
     def _ending(self, index: int) -> dict[str, Any]:
         """Info of an episode's end for stable-baselines3, with the reason."""
@@ -184,14 +184,14 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
         own = dict(state)
         self._statistics.carried[:] = own.pop("statistics")
         parts = split(own, [self._scenes[first:last] for first, last in self.workers.groups])
-        self._call([Message(Batch.restore, (part,)) for part in parts])
+        self.workers.call([Message(Batch.restore, (part,)) for part in parts])
         self._reset_seeds()
 
     def copy(self, source: NDArray[np.int64]) -> NDArray[np.float32]:
         """Each environment continues from the state of environment `source`, (num_envs,), of its own group, see
         `Batch.copy`. Returns observations."""
         parts = [source[first:last] - first for first, last in self.workers.groups]
-        self._call([Message(Batch.copy, (part,)) for part in parts])
+        self.workers.call([Message(Batch.copy, (part,)) for part in parts])
         return self._buffers["observation"].copy()
 
     def close(self) -> None:
@@ -242,15 +242,11 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
 
     def _set_levels(self, levels: Array) -> None:
         parts = [levels[first:last] for first, last in self.workers.groups]
-        self._call([Message(Batch.set_levels, (part,)) for part in parts])
+        self.workers.call([Message(Batch.set_levels, (part,)) for part in parts])
 
     def _levels(self) -> Array:
         return np.concatenate(self._read(Batch.levels))
 
     def _read(self, method: Callable[[Batch], Any]) -> list[Any]:
         """Results of a read-only method of each group of environments."""
-        return self._call([Message(method, changes=False) for _ in self.workers.groups])
-
-    def _call(self, messages: Sequence[Message]) -> list[Any]:
-        self.workers.ask(messages)
-        return self.workers.answers()
+        return self.workers.call([Message(method, changes=False) for _ in self.workers.groups])

@@ -49,6 +49,11 @@ class Workers(Protocol):
     def answers(self) -> list[Any]:
         """Replies of the groups, in their order."""
 
+    def call(self, messages: Sequence[Message]) -> list[Any]:
+        """Replies of the groups to messages."""
+        self.ask(messages)
+        return self.answers()
+
     def close(self) -> None:
         """Stops the workers."""
 
@@ -67,7 +72,7 @@ class Building(Protocol):
         """The environments from `first` to `last`, the latter excluded."""
 
 
-class InProcess:
+class InProcess(Workers):
     """All environments in this process."""
 
     def __init__(self, setup: Building) -> None:
@@ -84,20 +89,18 @@ class InProcess:
         return [self._answer]
 
     def close(self) -> None:
-        """See `Workers`."""
+        """There is nothing to stop."""
 
 
 @dataclass
 class WorkerProcess:
-    """One worker process."""
-
     popen: subprocess.Popen[bytes]
     connection: Connection
     log: int
     """File descriptor to which the worker writes its traceback when it crashes or hangs."""
 
 
-class WorkerProcesses:
+class WorkerProcesses(Workers):
     """Environments spread over worker processes, which share memory with this one."""
 
     def __init__(self, setup: Building, count: int, patience: float) -> None:
@@ -146,7 +149,7 @@ class WorkerProcesses:
             self._asked.add(index)
 
     def answers(self) -> list[Any]:
-        """See `Workers`. Raises WorkerFailed."""
+        """Raises WorkerFailed."""
         self._wait(self._patience)
         return self._answers
 
