@@ -52,17 +52,14 @@ class Disturbance:
         blow = random.absorb(key[which], self._count[which])
         size = random.draw(blow, f"{self._name}/size", self._size)[:, 0]
         impulse = size * scale[which]
-        self.force[which] = self._direction(blow) * (impulse / (self._length * self._period))[:, None]
-        self._until[which] = step[which] + self._length
-        self._next[which] = step[which] + self._wait(blow)
-
-    def _direction(self, blow: Keys) -> Array:
-        """Unit vectors (k, 3), evenly over the circle or the sphere, whose zones of equal height have equal areas."""
         chance = random.uniform(blow, f"{self._name}/direction", 2)
-        turn = 2.0 * np.pi * chance[:, 0]
+        turn = 2.0 * np.pi * chance[:, 0]  # evenly over the circle, or the sphere: equal areas in zones of equal height
         rise = np.zeros(len(blow)) if self._level else 2.0 * chance[:, 1] - 1.0
         across = np.sqrt(1.0 - rise * rise)
-        return np.stack([across * np.cos(turn), across * np.sin(turn), rise], axis=1)
+        direction = np.stack([across * np.cos(turn), across * np.sin(turn), rise], axis=1)
+        self.force[which] = direction * (impulse / (self._length * self._period))[:, None]
+        self._until[which] = step[which] + self._length
+        self._next[which] = step[which] + self._wait(blow)
 
     def arrays(self) -> dict[str, Array]:
         return {"next": self._next, "until": self._until, "count": self._count, "force": self.force}

@@ -84,10 +84,6 @@ class ModelFields:
             fields["geom_friction"][ids[:, None], self._layout.palms, 0] = friction
             fields["geom_friction"][ids[:, None], self._layout.palms, 1] = self._scene.grasp.torsion * friction
 
-    def place_grips(self, ids: Indices, places: Array) -> None:
-        """Sets the connection points of the grips on the object, (k, 2, 3), object frame [m]."""
-        self.arrays["site_pos"][ids[:, None], self._layout.object_grips] = places
-
     def fit_width(self, ids: Indices, width: Array) -> None:
         """Makes the object as wide as the space between the palms, (k,) [m]."""
         geom = self._layout.object_geom

@@ -164,7 +164,7 @@ class World:
         self.qpos[ids, start : start + 3] = rotations.rotate(turn, middle)
         self.qpos[ids, start + 3 : start + 7] = turn
         if self.layout.palms is None:
-            self.fields.place_grips(ids, in_heading - middle[:, None])
+            self.fields.arrays["site_pos"][ids[:, None], self.layout.object_grips] = in_heading - middle[:, None]
         else:
             between = in_heading[:, 0, 1] - in_heading[:, 1, 1]
             self.fields.fit_width(ids, between - 2.0 * (radius - PALM_OVERLAP))
@@ -305,17 +305,12 @@ class World:
         common *= self._object_part
         common += robot_velocity
         state.system_velocity[place] = common
-        self._gather_load(state, thing)
-
-    def _gather_load(self, state: SimulationState, thing: int) -> None:
-        """Forces of hands and of other links on the object; the latter are all but hands, partner and impulses."""
-        place = self.place
         grip = self._external[:, HANDS, 3:]
         state.grip_force[place] = grip
         hands = grip[:, 0] + grip[:, 1]
         if self.scene.kind == "lift":
             state.hand_weight_share[place] = hands[:, 2] / (-GRAVITY * self.fields.object_mass)
-        hands += self._external[:, THING, 3:]
+        hands += self._external[:, THING, 3:]  # other links exert all but the forces of hands, partner and impulses
         hands -= self._applied[:, thing, :3]
         state.link_object_force[place] = np.sqrt(np.vecdot(hands, hands))
 
@@ -329,7 +324,6 @@ class World:
         return {**self._memory, "state": self.batch.state, "warnings": self._warnings, **self.fields.arrays}
 
     def snapshot(self) -> dict[str, Array]:
-        """Copies of the complete state of the simulations."""
         return {name: array.copy() for name, array in self._arrays().items()}
 
     def restore(self, values: Mapping[str, Array]) -> None:

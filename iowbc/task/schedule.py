@@ -65,23 +65,20 @@ class Schedule:
         """Starts new episodes and returns their keys, (k,)."""
         memory = self._memory
         memory.episode[which] += 1
-        key = self._with_replays(which, random.absorb(self.key[which], memory.episode[which]))
+        key, chance = random.absorb(self.key[which], memory.episode[which]), self._task.curriculum.replay
+        if chance > 0.0 and self._trials is None:  # some are the environment's failed episode again
+            again = memory.failed[which] & (random.uniform(key, "episode/replay", 1)[:, 0] < chance)
+            key = np.where(again, memory.failed_key[which], key)
         self.episode_key[which] = key
-        memory.steps[which] = 0
-        memory.limit[which] = self._time_limits(which, key)
+        low, high = self._task.episode_duration
+        seconds = low + (high - low) * random.uniform(key, "episode/duration", 1)[:, 0]
+        if self._trials is not None:
+            seconds = np.array([self._trials[index].duration for index in which])
+        memory.steps[which], memory.limit[which] = 0, np.maximum(np.round(seconds / self._period), 1)
         standing = random.uniform(key, "episode/standing", 1)[:, 0] < self._task.commands.standing_episodes
         memory.walking[which] = ~standing
         memory.played[which] = played_levels(self._task.curriculum, memory.level[which], ~standing)
         return key
-
-    def _with_replays(self, which: Indices, key: Keys) -> Keys:
-        """Keys of new episodes (k,), some replaced by that of the environment's failed episode."""
-        chance = self._task.curriculum.replay
-        if chance == 0.0 or self._trials is not None:
-            return key
-        memory = self._memory
-        again = memory.failed[which] & (random.uniform(key, "episode/replay", 1)[:, 0] < chance)
-        return np.where(again, memory.failed_key[which], key)
 
     def scales(self, which: Indices, key: Keys) -> dict[str, Array]:
         """Difficulty scales of new episodes for the simulation, by name, (k,); none for trials."""
@@ -95,14 +92,6 @@ class Schedule:
             "impulse_scale": hardness["disturbance"],
             "push_scale": hardness["disturbance"],
         }
-
-    def _time_limits(self, which: Indices, key: Keys) -> NDArray[np.int64]:
-        """Time limits of new episodes, (k,) [control steps]."""
-        low, high = self._task.episode_duration
-        seconds = low + (high - low) * random.uniform(key, "episode/duration", 1)[:, 0]
-        if self._trials is not None:
-            seconds = np.array([self._trials[index].duration for index in which])
-        return np.maximum(np.round(seconds / self._period), 1).astype(np.int64)
 
     def causes(self, ending: Ending) -> dict[str, Mask]:
         """Situations of the robots that fall in this step, by name, (n,)."""

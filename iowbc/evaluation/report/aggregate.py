@@ -60,11 +60,7 @@ def aggregate(trials: pd.DataFrame) -> pd.DataFrame:
     metrics = [name for name in numbers if not name.startswith("drawn_")]
     groups = trials.groupby(GROUP, sort=False)
     table = pd.DataFrame([_row(dict(zip(GROUP, key, strict=True)), group, metrics) for key, group in groups])
-    ranks = {
-        "variant": variants_of(trials),
-        "suite": list(dict.fromkeys(trials["suite"])),
-        "case": list(dict.fromkeys(trials["case"])),
-    }
+    ranks = {name: list(dict.fromkeys(trials[name])) for name in ("suite", "case")} | {"variant": variants_of(trials)}
     order = ["suite", "case", "mass", "impulse", "variant"]
     return table.sort_values(
         order, key=lambda values: values.map(ranks[values.name].index) if values.name in ranks else values

@@ -20,7 +20,9 @@ def draw_goals(
     goals = np.empty((len(key), len(COMMAND)))
     goals[:, :3] = _velocities(commands, key, difficulty, pushing) * walking[:, None]
     goals[:, 3:] = _posture(commands, key, difficulty["posture"])
-    deep = _deep_pitch(commands, key, difficulty["posture"]) * ~goals[:, :3].any(axis=1)
+    u, (low, high) = random.uniform(key, "command/deep", 2), commands.deep_pitch
+    deep = (low + (high - low) * u[:, 0]) * difficulty["posture"] * (u[:, 1] < commands.deep_share)
+    deep *= ~goals[:, :3].any(axis=1)  # a share of the standing commands bows deeply
     goals[:, PITCH] = np.where(deep != 0.0, deep, goals[:, PITCH])
     return goals
 
@@ -49,13 +51,6 @@ def _velocities(commands: Commands, key: Keys, difficulty: Mapping[str, Array], 
     slow = on_the_spot & (np.abs(velocity[:, 2]) < commands.smallest_yaw_rate)
     velocity[slow, 2] = np.copysign(commands.smallest_yaw_rate, velocity[slow, 2])
     return velocity * (u[:, 5] >= commands.standing_share)[:, None]
-
-
-def _deep_pitch(commands: Commands, key: Keys, scale: Array) -> Array:
-    """α ~ U(deep_pitch)·scale in a share of the commands, zero in the others, (n,) [rad]."""
-    u = random.uniform(key, "command/deep", 2)
-    low, high = commands.deep_pitch
-    return (low + (high - low) * u[:, 0]) * scale * (u[:, 1] < commands.deep_share)
 
 
 def _posture(commands: Commands, key: Keys, scale: Array) -> Array:

@@ -100,7 +100,9 @@ class Trace:
     power: Annotated[Array, Signal(1, lambda s: terms.power(s.state.joint_torque, s.state.joint_velocity))]
     """Sum over the joints of |torque x speed|, (T,) [W]."""
     base_position: Annotated[Array, Signal(3, lambda s: s.state.base_position)]
-    torso_position: Annotated[Array, TrialSignal(3, lambda s: torso_centre(s.state))]
+    torso_position: Annotated[
+        Array, TrialSignal(3, lambda s: s.state.base_position + TORSO_CENTRE * s.state.torso_rotation[:, :, 2])
+    ]
     object_position: Annotated[Array, TrialSignal(3, lambda s: s.state.object_position)]
     """Position of base, a point in the torso, and object (zero without one), (T, 3) [m]."""
     foot_position: Annotated[Array, TrialSignal(6, lambda s: s.state.foot_position)]
@@ -126,15 +128,9 @@ class Trace:
         return len(self.heading)
 
 
-def torso_centre(state: "SimulationState") -> Array:
-    """The point recorded as the torso's position, (n, 3) [m]."""
-    return state.base_position + TORSO_CENTRE * state.torso_rotation[:, :, 2]
-
-
 RECORDED: dict[str, Signal] = {
     name: hint.__metadata__[0] for name, hint in get_type_hints(Trace, include_extras=True).items() if name != "dt"
 }
-"""Signals of a trace."""
 SIGNALS = RECORDED | {
     "fallen": Signal(1, lambda s: s.ending.fallen),
     "dropped": Signal(1, lambda s: s.ending.dropped),

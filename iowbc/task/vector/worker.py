@@ -49,9 +49,7 @@ def main() -> None:
     connection = Connection(pipe)
     try:
         _serve(connection, memory)
-    except (EOFError, BrokenPipeError, ConnectionResetError):
-        pass
-    finally:
+    finally:  # also where the parent has gone
         connection.close()
         file.flush()
         os._exit(0)
