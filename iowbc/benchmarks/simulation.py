@@ -20,12 +20,7 @@ EPISODE = 10.0
 
 
 def main(
-    recipe: Recipe,
-    *,
-    scene: str = "lift",
-    environments: int = 48,
-    workers: Sequence[int] = (),
-    turns: int = 15,
+    recipe: Recipe, *, scene: str = "lift", environments: int = 48, workers: Sequence[int] = (), turns: int = 15
 ) -> dict[str, float]:
     """Measures, prints the tables, returns every figure by name (rates in environment steps a second, times in ms).
 

@@ -25,7 +25,6 @@ class Actor:
     """A variant in the video."""
 
     world: Specification
-    """Specification of its trials."""
     policy: Policy
     trials: pd.DataFrame
     """Its long table."""
@@ -44,10 +43,7 @@ def common_trial(actors: Sequence[Actor]) -> list["pd.Series[Any]"]:
 
 
 def film_side_by_side(
-    actors: Sequence[Actor],
-    rows: Sequence["pd.Series[Any]"],
-    path: Path,
-    progress: Callable[[float, float], None],
+    actors: Sequence[Actor], rows: Sequence["pd.Series[Any]"], path: Path, progress: Callable[[float, float], None]
 ) -> None:
     """Replay the trial in each actor's row and film them as tiles; a trial that ends early keeps its last frame.
 

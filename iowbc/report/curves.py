@@ -22,14 +22,7 @@ Values = NDArray[np.float64]
 MOST_POINTS = 400
 """Points of a curve; a longer one is averaged over neighbours."""
 BAND = 0.2
-"""Opacity of a band."""
-ERRORS = {
-    "rate": "success rate",
-    "E_v": "E_v [m/s]",
-    "E_psi": "E_ψ [rad]",
-    "E_alpha": "E_α [rad]",
-    "E_h": "E_h [m]",
-}
+ERRORS = {"rate": "success rate", "E_v": "E_v [m/s]", "E_psi": "E_ψ [rad]", "E_alpha": "E_α [rad]", "E_h": "E_h [m]"}
 SWEPT = 2
 """Minimum number of masses for a curve of a suite."""
 PICTURE_POINTS = 120
@@ -80,8 +73,6 @@ class Curve:
 
 @dataclass
 class CurvePanel:
-    """One small figure."""
-
     title: str
     curves: list[Curve] = field(default_factory=list)
     across: str = "million environment steps"

@@ -148,11 +148,7 @@ class Simulation:
         self.episode[:] = 0
 
     def reset(
-        self,
-        which: Indices,
-        joint_position: Array,
-        base_pitch: Array | None = None,
-        key: Keys | None = None,
+        self, which: Indices, joint_position: Array, base_pitch: Array | None = None, key: Keys | None = None
     ) -> None:
         """Starts new episodes: draws what is random, puts the robot on its soles and the object into its hands.
 

@@ -86,15 +86,9 @@ def run(job: Job) -> None:
             facts_mirror=side_by_side([own[name] for name in FACTS]),
             action_mirror=action_mirror(robot),
         )
+        owners, architecture = np.array([folders.index(folder_of[scene]) for scene in scenes]), about["architecture"]
         training = StudentTraining(
-            settings,
-            environments,
-            teachers,
-            np.array([folders.index(folder_of[scene]) for scene in scenes]),
-            about["architecture"],
-            rows,
-            recipe.teacher.symmetry,
-            seed,
+            settings, environments, teachers, owners, architecture, rows, recipe.teacher.symmetry, seed
         )
         curves = train(job, training, settings.checkpoint_every, _note)
         curriculum = environments.curriculum()
