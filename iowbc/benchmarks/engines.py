@@ -43,7 +43,6 @@ class Agreement:
 
     @property
     def agrees(self) -> bool:
-        """True if the engines differ by no more than the tolerance."""
         return bool(abs(self.engines[0] - self.engines[1]) <= self.tolerance)
 
 
@@ -204,7 +203,6 @@ def _lift(simulation: Simulation) -> None:
 
 
 def _hold_base(simulation: Simulation) -> None:
-    """Holds the bases immovable in the air."""
     _lift(simulation)
     base = simulation.worlds[0].layout.base
     _edit(simulation, body_mass=(base, IMMOVABLE), body_inertia=(base, IMMOVABLE))

@@ -122,7 +122,6 @@ def _grow(run: Run, rows: list[list[Run]], place: float) -> list[Run]:
 
 
 def _runs(row: Mask) -> list[Run]:
-    """First and last place of each run of True."""
     edges = np.diff(np.concatenate([[0], row.astype(np.int8), [0]]))
     starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
     return list(zip(starts.tolist(), ends.tolist(), strict=True))

@@ -56,7 +56,6 @@ def leg_joints(robot: Robot) -> list[list[int]]:
 
 
 def leg_geometry(robot: Robot) -> Legs:
-    """The legs' geometry, from the robot's description."""
     legs = [_vectors(robot, *pair) for pair in zip(robot.sole_bodies, robot.soles, strict=True)]
     both = {name: np.array([leg[name] for leg in legs]) for name in legs[0]}
     side, ankle_roll = both.pop("side")[:, 1], both.pop("ankle_roll")[:, 2]

@@ -24,7 +24,6 @@ class SkillCommand:
         self._low, self._high = ahead[:, 0], ahead[:, 1]
 
     def standing(self) -> Array:
-        """Commands to stand."""
         return self._still.copy()
 
     def following(self, force: Array, object_yaw: Array) -> Array:

@@ -53,8 +53,6 @@ STATE: Mapping[str, tuple[str, str, str]] = {
 
 @dataclass(frozen=True)
 class StepResult:
-    """Result of a control step."""
-
     target: Array
     """Position targets of all joints, MJCF order, (n, joints) [rad]."""
     action: Array

@@ -121,7 +121,6 @@ class Skill:
         return cls(contract, session, controller, scene, pushing)
 
     def reset(self) -> None:
-        """Reset all robots."""
         n = self._controller.robots
         self._hands = HandForces(self._controller.robot, self._references, n)
         self._felt = np.zeros((n, self.contract.robot.history, 2, 3))

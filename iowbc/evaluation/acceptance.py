@@ -60,7 +60,6 @@ class Accepted:
 
     @property
     def enough(self) -> bool:
-        """True if at least as many trials passed as the recipe requires."""
         return self.passed >= self.asked.minimum
 
     @property

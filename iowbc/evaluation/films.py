@@ -92,7 +92,6 @@ class Filming:
         self._simulation, self._add, self._video, self._lines = simulation, add, video, lines
         self._renderer: SceneRenderer | None = None
         self.frames = 0
-        """Number of frames so far."""
 
     def look(self, seconds: float, text: Callable[[], Sequence[str]]) -> None:
         """Film the state at a time [s] if a frame is due, with lines of text. Raises NoRenderer."""

@@ -12,7 +12,6 @@ from iowbc.sim.objects import GROUND_BIT, OBJECT_BIT, add_force_sensor, add_obje
 from iowbc.sim.timing import Timing
 
 GROUND = "ground"
-"""Name of its geom."""
 FORCE, NET_FORCE = 1 << mujoco.mjtConDataField.mjCONDATA_FORCE.value, 3
 """Output of MuJoCo's contact sensors: the force alone, summed over all contacts."""
 LEG_BITS = (8, 16)

@@ -28,7 +28,6 @@ class Period:
     """Force at which a hand slips in a compliant grasp, (n,) [N]."""
 
     def rows(self, place: slice | Indices) -> Self:
-        """The inputs of some environments."""
         return type(self)(**{name: values[place] for name, values in vars(self).items()})
 
 

@@ -44,7 +44,6 @@ class GameSetup:
     student: Student
     """The controller below the games."""
     count: int
-    """Number of games."""
     seed: int
     partners: tuple[str, ...]
     """Humans to sample in games without a plan."""
@@ -71,7 +70,6 @@ class GameSetup:
 
     @cached_property
     def scenes(self) -> list[str]:
-        """Name of each game's scene."""
         if self.plans is not None:
             return [self.tasks[plan.task].scene for plan in self.plans]
         weights: dict[str, float] = {}

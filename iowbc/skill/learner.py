@@ -66,7 +66,6 @@ class SkillTraining:
         return np.random.default_rng([self.seed, steps]).integers(2**63, size=self.game.n, dtype=np.uint64)
 
     def _judged(self, observed: Observed) -> Array:
-        """Input of the value network."""
         return observed.observations[ROBOT] if self.settings.algorithm == "ppo" else observed.state
 
     def _collect(self) -> tuple[dict[str, Tensor], dict[str, float]]:
@@ -129,7 +128,6 @@ class SkillTraining:
             each.normalization.move(each.network.normalizer)
 
     def _explored(self, observed: Observed) -> dict[str, Array]:
-        """Sampled action of each agent."""
         found = {}
         with torch.inference_mode():
             for name, agent in self.agents.items():

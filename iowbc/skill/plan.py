@@ -31,7 +31,6 @@ class Plan:
     """Fixed quantities of every episode of an environment; the others are sampled."""
 
     task: str
-    """Name of a transport task."""
     partner: str
     """One of `KINDS`."""
     known: bool

@@ -74,7 +74,6 @@ def _note(values: Mapping[str, float]) -> str:
 GOLDEN_DECISIONS = 10
 """Decisions of all games whose observations are the golden vectors."""
 KINDS = ("scripted", "learnt")
-"""Kinds of humans."""
 GAME = tuple(
     f"skill.{part}"
     for part in (

@@ -36,8 +36,6 @@ class Judgement:
 
 
 class Judge:
-    """Evaluates the control steps of n environments."""
-
     def __init__(self, recipe: Recipe, robot: Robot, holding: Mask, *, training: bool) -> None:
         """`holding`: environments that begin with an object in the hands, (n,); `training`: execute user-defined reward
         terms, and end the episodes of robots that lag behind the command or lose their crate."""

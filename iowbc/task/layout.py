@@ -22,7 +22,6 @@ class FullLayout:
         self.state, self.extra = state, extra
         start, self.size = state.size, state.size + extra.size
         self.observation, self.privileged = slice(0, start), slice(start, self.size)
-        """Places of s_t and s_priv."""
         self.mirror = side_by_side((state.mirror, extra.mirror))
         """Mirror of a row, (size,), float32."""
         privileged = {f"privileged/{k}": slice(s.start + start, s.stop + start) for k, s in extra.slices.items()}

@@ -142,7 +142,6 @@ class Twin:
 
     @property
     def fallen(self) -> bool:
-        """True if the pelvis is too low or tilted too far."""
         state = self.simulation.state
         low = state.base_position[0, 2] < LYING_HEIGHT
         return bool(low or state.base_rotation[0, 2, 2] < np.cos(LYING_TILT))

@@ -42,12 +42,10 @@ class Support:
 
     @property
     def waits(self) -> bool:
-        """True until the release begins."""
         return self.kind != "none" and self._time < self._release
 
     @property
     def rigid(self) -> bool:
-        """True while robot and object are held still."""
         return self.kind == "fixture" and self.waits
 
     def force(self, away: Array, velocity: Array) -> Array:

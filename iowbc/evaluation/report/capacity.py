@@ -17,12 +17,10 @@ class Capacity:
     value: float | None
     """None if the smallest tested value failed."""
     smallest: float
-    """Smallest tested value."""
     open_ended: bool
     """True if `value` is the largest tested value, so that the capacity may be larger."""
 
     def text(self, unit: str) -> str:
-        """Table cell."""
         if self.value is None:
             return f"< {self.smallest:g} {unit}" if self.smallest > 0 else "Fails"
         return f"{'≥ ' if self.open_ended else ''}{self.value:g} {unit}"
@@ -55,7 +53,6 @@ def _capacities(rows: pd.DataFrame, by: str, rate: float) -> Capacities:
 
 
 def capacity_table(summary: pd.DataFrame, rate: float) -> Table:
-    """Load capacity of each variant by suite at a success rate."""
     suites = suites_of(summary, *SWEPT)
     asked = [(summary.loc[summary["suite"] == suite, "commanded_distance"] > 0).any() for suite in suites]
     caption = (

@@ -27,7 +27,6 @@ def trainings(rows: pd.DataFrame) -> str:
 
 
 def measures(rows: pd.DataFrame) -> str:
-    """Measurement of the errors."""
     return (
         f"Errors against the command as given; height is that of {_by_variant(rows, 'height', HEIGHTS.__getitem__)}; "
         f"E_v with v_sys averaged over one gait period of {_by_variant(rows, 'gait_period', '{:.2f} s'.format)}."
@@ -49,7 +48,6 @@ def in_common(rows: pd.DataFrame) -> str:
 
 
 def partner(rows: pd.DataFrame) -> str:
-    """The partner's share."""
     shares = rows["partner_share"].unique()
     if len(shares) > 1:
         return "the partner's share by case"
@@ -60,7 +58,6 @@ def partner(rows: pd.DataFrame) -> str:
 
 
 def rolling_resistance(rows: pd.DataFrame) -> str:
-    """The crate's μ."""
     found = _by_variant(rows, "rolling_resistance", lambda value: f"μ {value:g}" if value >= 0 else DRAWN)
     return f"rolling resistance {found}"
 

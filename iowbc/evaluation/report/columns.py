@@ -33,7 +33,6 @@ class Entry:
 
     column: Column
     cell: Callable[[pd.Series], Cell]
-    """Cell of a row of the summary."""
     still: Callable[[pd.DataFrame], Cell] = lambda rows: ABSENT
     """Cell of a robot that stands still, from the rows of all variants."""
 
@@ -62,7 +61,6 @@ def variant_table(
 
 
 def still_row(entries: Sequence[Entry], rows: pd.DataFrame, name: str = "any") -> tuple[Cell, ...]:
-    """The row of a robot that stands still."""
     return (name, STANDS_STILL, *(one.still(rows) for one in entries))
 
 

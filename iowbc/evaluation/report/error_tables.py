@@ -107,7 +107,6 @@ def paper_table(summary: pd.DataFrame, labels: Mapping[str, str] = NO_LABELS) ->
 
 
 def slug(suite: str) -> str:
-    """File name of a suite."""
     return suite.replace(" ", "_")
 
 

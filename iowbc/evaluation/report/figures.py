@@ -50,7 +50,6 @@ FAILURE_SPACING = 0.035
 COUNT_WIDTH = 0.021
 """Width of a character of a survivor count, as a fraction of the range of masses."""
 WHISKERS = {"ecolor": "black", "capsize": 3, "elinewidth": 1.0}
-"""Style of intervals on bars."""
 
 
 def style_of(variant: str, variants: Sequence[str]) -> dict[str, Any]:
@@ -159,7 +158,6 @@ def finish(figure: Figure, lettered: Sequence[Axes], title: str, legend_of: Axes
 
 
 def tidy(axes: Axes) -> None:
-    """Start the vertical axis at zero, add a grid, remove the frame."""
     _from_zero(axes)
     axes.grid(True, color="0.9")
     axes.spines[["top", "right"]].set_visible(False)

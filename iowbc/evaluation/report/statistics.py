@@ -16,7 +16,6 @@ CONFIDENCE = 0.95
 ENDS = ((1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2)
 """Quantiles of the ends of such an interval."""
 RESAMPLES = 2000
-"""Number of bootstrap resamples."""
 
 
 def wilson_interval(successes: int, trials: int, design: float = 1.0) -> tuple[float, float]:
@@ -119,7 +118,6 @@ class Bootstrapped(NamedTuple):
     high: float
 
     def named(self, name: str) -> dict[str, float]:
-        """Columns for a table of numbers."""
         return {name: self.value, f"{name}_low": self.low, f"{name}_high": self.high}
 
 

@@ -23,7 +23,6 @@ class Outcome:
 
     @property
     def survived(self) -> bool:
-        """True if the episode finished without a fall or a drop."""
         return self.finished and not (self.fallen or self.dropped)
 
     @property

@@ -85,7 +85,6 @@ def _pushed(recipe: Recipe, scene: str) -> bool:
 
 
 def trial_seed(evaluation: Evaluation, number: int) -> int:
-    """Seed of the trials of a number."""
     return SPLITS[evaluation.split] + evaluation.seed + number
 
 

@@ -68,7 +68,6 @@ class QuickEvaluation:
         return found
 
     def close(self) -> None:
-        """Close the environments."""
         self._environment.close()
 
 

@@ -77,7 +77,6 @@ class _Motions:
         return [*turns, low, self.straight(), bowed, self._posture(self._stand())]
 
     def straight(self) -> Array:
-        """Straight forward walk."""
         return self._walk(self._between(self.scripts.walking), 0.0, 0.0)
 
     def _walk(self, forward: float, left: float, turn: float) -> Array:

@@ -18,7 +18,6 @@ REASONS = ("fallen", "dropped", "lagging", "time_limit", "diverged")
 CAUSES = ("walking", "standing", "disturbed")
 """Situations in which a robot falls: walking, standing, or just after a disturbance."""
 KINDS = ("standing", "walking")
-"""Kinds of command."""
 ERRORS = ("velocity", "heading", "height", "pitch")
 """Tracking errors: the norm of v_sys - v_coll in the plane, filtered [m/s], heading [rad], height [m], pitch [rad]."""
 COUNTERS = (

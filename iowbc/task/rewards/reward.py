@@ -11,7 +11,6 @@ from iowbc.task.own_function import load_function
 from iowbc.task.rewards.table import ONCE, TERMS, TRACKED, Step, Term
 
 CONTRACT = "it takes a Step (iowbc/task/rewards/table.py) and returns a finite number for each environment, shape (n,)"
-"""Contract of a user-defined term."""
 
 
 class WeightedTerm:
