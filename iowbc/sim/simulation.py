@@ -5,10 +5,9 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from iowbc import counter_random as random
-from iowbc.arrays import Array, Indices, Keys
+from iowbc.arrays import Array, Indices, Keys, Mask
 from iowbc.control.layout import EVERY
 from iowbc.recipe.evaluation.evaluation import Drake
 from iowbc.recipe.simulation.simulation import SimulationSettings as Recipe
@@ -113,13 +112,13 @@ class Simulation:
         self._noise = np.zeros((n, width + width % 2))
 
     @property
-    def infeasible(self) -> NDArray[np.bool_]:
+    def infeasible(self) -> Mask:
         """True where a crate's rolling resistance exceeds the friction between feet and ground, (n,)."""
         hold = self.drawn["ground_friction"] * self._robot_mass * GRAVITY
         return self.drawn["rolling_resistance"] > hold
 
     @property
-    def disturbed(self) -> NDArray[np.bool_]:
+    def disturbed(self) -> Mask:
         """True where an impulse or a push acts in this control period, (n,)."""
         return np.logical_or(self._impulses.force.any(axis=1), self._pushes.force.any(axis=1))
 
@@ -142,7 +141,7 @@ class Simulation:
         for name, values in fixed.items():
             self.fixed.setdefault(name, np.full(self.n, np.nan))[which] = values
 
-    def reseed(self, key: NDArray[np.uint64]) -> None:
+    def reseed(self, key: Keys) -> None:
         """Restarts all random sequences, from the next reset on; `key` (n,) as from `random.environment_key`."""
         self._key[:] = key
         self.episode[:] = 0

@@ -4,9 +4,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from iowbc.arrays import Array, Indices, as_slice
+from iowbc.arrays import Array, Indices, Keys, as_slice
 from iowbc.control import gait
 from iowbc.control.action import action_scale
 from iowbc.control.command import HEIGHT, OFFSET, VELOCITY, YAW_RATE
@@ -78,7 +77,7 @@ class Batch:
         """Joint targets of an action (n, 15) in the next step, (n, joints) [rad]."""
         return self.guidance.targets(self.memory, action.clip(-self._bound, self._bound))
 
-    def reset(self, seeds: NDArray[np.uint64] | None = None) -> None:
+    def reset(self, seeds: Keys | None = None) -> None:
         """Starts an episode in every environment; `seeds` (n,) reseed all random number streams."""
         if seeds is not None:
             self.reseed(seeds)
@@ -93,7 +92,7 @@ class Batch:
         step = Recorded(self.simulation, moved, self.memory, ending, nothing, self.period)
         write_signals(self.buffers, step, planned=False)
 
-    def reseed(self, seeds: NDArray[np.uint64]) -> None:
+    def reseed(self, seeds: Keys) -> None:
         """Reseeds all random number streams from seeds (n,)."""
         self._schedule.reseed(seeds)
         self.simulation.reseed(self._schedule.key)

@@ -4,8 +4,8 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from iowbc.arrays import Indices
 from iowbc.control.layout import Layout
 from iowbc.control.observation import ObservationLayout, observation_layout
 from iowbc.recipe.recipe import Recipe
@@ -31,7 +31,7 @@ class FullLayout:
     def describe(self) -> dict[str, list[dict[str, Any]]]:
         return {"observation": self.state.describe(), "privileged": self.extra.describe()}
 
-    def privileged_places(self, names: Iterable[str]) -> NDArray[np.int64]:
+    def privileged_places(self, names: Iterable[str]) -> Indices:
         """Places in the row of parts of s_priv, by name."""
         parts = [np.arange(self.size)[self.slices[f"privileged/{name}"]] for name in names]
         return np.concatenate([np.zeros(0, np.int64), *parts])

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from iowbc import counter_random as random
 from iowbc.arrays import Array, Indices, Keys, Mask
@@ -20,13 +19,7 @@ class Schedule:
     """Random keys, time limits and levels of n environments."""
 
     def __init__(
-        self,
-        task: Task,
-        memory: EpisodeState,
-        *,
-        environments: NDArray[np.int64],
-        seed: int,
-        trials: Sequence[Episode] | None,
+        self, task: Task, memory: EpisodeState, *, environments: Indices, seed: int, trials: Sequence[Episode] | None
     ) -> None:
         """`environments`: global indices, (n,); `trials`: one per environment; None draws episodes at random."""
         n = len(environments)
@@ -57,7 +50,7 @@ class Schedule:
         """True if a reset begins the same episodes again."""
         return self._trials is not None
 
-    def reseed(self, seeds: NDArray[np.uint64]) -> None:
+    def reseed(self, seeds: Keys) -> None:
         """Reseeds all random number streams from seeds (n,)."""
         self.key[:] = random.environment_key(seeds, np.zeros(len(seeds), np.int64))
 

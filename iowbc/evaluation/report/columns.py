@@ -49,12 +49,7 @@ def variant_rows(
 
 
 def variant_table(
-    name: str,
-    caption: str,
-    first: str,
-    entries: Sequence[Entry],
-    rows: Sequence[tuple[Cell, ...]],
-    numbers: pd.DataFrame,
+    name: str, caption: str, first: str, entries: Sequence[Entry], rows: list[tuple[Cell, ...]], numbers: pd.DataFrame
 ) -> Table:
     """Table of the rows of `variant_rows`; `first`: head of the column of group names."""
     return Table(name, caption, heads(first, "Algorithm", *(one.column for one in entries)), rows, numbers)

@@ -3,9 +3,8 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from iowbc.arrays import Array, Mask
+from iowbc.arrays import Array, Indices, Mask
 from iowbc.control.command import HEIGHT, PITCH, VELOCITY, YAW_RATE
 from iowbc.task.curriculum import AXES
 from iowbc.task.endings import Ending
@@ -57,7 +56,7 @@ def count_step(buffers: Buffers, judgement: Judgement, memory: EpisodeState) -> 
     counters[:, WALKING] += errors * walking
 
 
-def count_endings(buffers: Buffers, ending: Ending, causes: dict[str, Mask], which: NDArray[np.intp]) -> None:
+def count_endings(buffers: Buffers, ending: Ending, causes: dict[str, Mask], which: Indices) -> None:
     """Adds the episodes that ended, (k,), to the counters; `causes` of falls by name, (n,)."""
     counters = buffers["counters"]
     counters[which, COLUMN["episodes"]] += 1.0
@@ -69,7 +68,7 @@ def count_endings(buffers: Buffers, ending: Ending, causes: dict[str, Mask], whi
         counters[which, COLUMN[reason]] += found[which]
 
 
-def count_pushes(buffers: Buffers, pushing: Mask, memory: EpisodeState, which: NDArray[np.intp]) -> None:
+def count_pushes(buffers: Buffers, pushing: Mask, memory: EpisodeState, which: Indices) -> None:
     """Counts the pushes that begin, (k,), and the infeasible ones; `pushing`: environments with a push scene, (n,)."""
     counters = buffers["counters"]
     counters[which, COLUMN["pushes"]] += pushing[which]

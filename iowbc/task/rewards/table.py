@@ -8,7 +8,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from iowbc.arrays import Array, Indices, Mask
 from iowbc.control.command import HEIGHT, PITCH, YAW_RATE
@@ -26,7 +25,7 @@ class Step:
     state: SimulationState
     motion: Motion
     recipe: Reward
-    support: slice | NDArray[np.intp]
+    support: slice | Indices
     """Places of the support joints among all joints."""
     lateral: Indices
     """Support joints that do not turn about the lateral axis, among the support joints."""

@@ -6,10 +6,10 @@ The memory is anonymous, so that nothing is left behind when a process dies.
 import mmap
 import os
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from iowbc.arrays import Array
 
 ALIGNMENT = 64
 """Arrays start on a cache line, so that workers never write into one another's lines."""
@@ -18,7 +18,7 @@ Fields = Mapping[str, tuple[tuple[int, ...], str]]
 """Shape of one environment's part and dtype, by name."""
 
 
-class Buffers(dict[str, NDArray[Any]]):
+class Buffers(dict[str, Array]):
     """Arrays that an environment batch reads and writes in each step, by name; rows are environments."""
 
     def rows(self, first: int, last: int) -> "Buffers":
@@ -57,15 +57,15 @@ def _place(fields: Fields, rows: int) -> tuple[dict[str, int], int]:
     return offsets, max(end, 1)
 
 
-def join(parts: Sequence[Mapping[str, NDArray[Any]]]) -> dict[str, NDArray[Any]]:
+def join(parts: Sequence[Mapping[str, Array]]) -> dict[str, Array]:
     """The state of consecutive groups of environments as that of all."""
     names = list(dict.fromkeys(name for part in parts for name in part))
     return {name: np.concatenate([part[name] for part in parts if name in part]) for name in names}
 
 
-def split(arrays: Mapping[str, NDArray[Any]], scenes: Sequence[Sequence[str]]) -> list[dict[str, NDArray[Any]]]:
+def split(arrays: Mapping[str, Array], scenes: Sequence[Sequence[str]]) -> list[dict[str, Array]]:
     """Inverse of `join` for groups of environments with these scenes, in order."""
-    parts: list[dict[str, NDArray[Any]]] = [{} for _ in scenes]
+    parts: list[dict[str, Array]] = [{} for _ in scenes]
     for name, values in arrays.items():
         start = 0
         for part, group in zip(parts, scenes, strict=True):
