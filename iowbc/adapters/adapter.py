@@ -113,7 +113,16 @@ def validate_adapter(adapter: Adapter, robot: Robot, frequency: float, *, moves_
         problems.append(f"ranges: {', '.join(unknown)}: no such velocity; valid: {', '.join(VELOCITIES)}")
     if problems:
         raise StageFailed(f"{PLACE}: does not fit the robot {robot.name}: {'; '.join(problems)}")
-    _check_network_output(adapter)
+    try:  # a step of a robot that stands in the default posture
+        parts = [np.asarray(term(standing(adapter)), np.float64)[:, None] for term in adapter.terms]
+        past = tuple(np.repeat(values, adapter.history, 1) for values in parts)
+        observation = adapter.observed(past).astype(np.float32)
+        answer = np.asarray(adapter.network(observation))
+    except Exception as error:
+        raise StageFailed(f"{PLACE}: cannot make a step: {type(error).__name__}: {error}") from error
+    if answer.shape != (1, len(adapter.acted)) or not np.isfinite(answer).all():
+        text = f"its network gives shape {answer.shape} for an observation of {observation.shape[1]} numbers"
+        raise StageFailed(f"{PLACE}: {text}; expected {(1, len(adapter.acted))} finite numbers, one a joint of `acted`")
 
 
 def _joint_name_problems(adapter: Adapter, robot: Robot, moves_arms: bool) -> list[str]:
@@ -126,20 +135,6 @@ def _joint_name_problems(adapter: Adapter, robot: Robot, moves_arms: bool) -> li
     missing = ", ".join(name for name in needed if name not in adapter.acted)
     remedy = "; a controller without arms of its own needs arms: measured or default" if moves_arms else ""
     return [*found, f"acted: lacks {missing}{remedy}"] if missing else found
-
-
-def _check_network_output(adapter: Adapter) -> None:
-    """Check the network's output for a robot that stands in the default posture."""
-    try:
-        parts = [np.asarray(term(standing(adapter)), np.float64)[:, None] for term in adapter.terms]
-        past = tuple(np.repeat(values, adapter.history, 1) for values in parts)
-        observation = adapter.observed(past).astype(np.float32)
-        answer = np.asarray(adapter.network(observation))
-    except Exception as error:
-        raise StageFailed(f"{PLACE}: cannot make a step: {type(error).__name__}: {error}") from error
-    if answer.shape != (1, len(adapter.acted)) or not np.isfinite(answer).all():
-        text = f"its network gives shape {answer.shape} for an observation of {observation.shape[1]} numbers"
-        raise StageFailed(f"{PLACE}: {text}; expected {(1, len(adapter.acted))} finite numbers, one a joint of `acted`")
 
 
 def standing(adapter: Adapter) -> Seen:

@@ -19,7 +19,9 @@ def network(path: Path) -> Callable[..., Array]:
     """Load a network as a function from its inputs to its first output, float32 arrays. Raises StageFailed."""
     try:
         if path.suffix == ".onnx":
-            return _onnx(path)
+            session = open_session(path)
+            names = [one.name for one in session.get_inputs()]
+            return lambda *inputs: np.asarray(session.run(None, dict(zip(names, inputs, strict=True)))[0])
         if path.suffix in TORCHSCRIPT:
             return _torchscript(path)
     except Exception as error:
@@ -34,12 +36,6 @@ def metadata(path: Path) -> Mapping[str, Any]:
         return {name: json.loads(value) for name, value in said.items()}
     except Exception as error:
         raise StageFailed(f"{path}: its metadata cannot be read: {error}") from error
-
-
-def _onnx(path: Path) -> Callable[..., Array]:
-    session = open_session(path)
-    names = [one.name for one in session.get_inputs()]
-    return lambda *inputs: np.asarray(session.run(None, dict(zip(names, inputs, strict=True)))[0])
 
 
 def _torchscript(path: Path) -> Callable[..., Array]:

@@ -46,7 +46,8 @@ class Group:
     def seeds(self) -> tuple[str, ...]:
         """Seed of each run's training; where seeds are equal, the labels of the runs."""
         for path in ("skill.learning.seed", "teacher.seed"):
-            seeds = [str(_seed(run.recipe, path)) for run in self.runs]
+            own = [(flattened(run.recipe).get(path), run.recipe.get("seed", 0)) for run in self.runs]
+            seeds = [str(int(usual if seed is None else seed)) for seed, usual in own]
             if len({*seeds}) == len(seeds):
                 return tuple(seeds)
         return tuple(run.label for run in self.runs)
@@ -113,12 +114,6 @@ def _of_one_variant(first: Run, second: Run) -> bool:
     ]
     labels = [run.recipe.get("eval", {}).get("label") for run in (first, second)]
     return "eval" in shared and all(decided[0]) and decided[0] == decided[1] and labels[0] == labels[1]
-
-
-def _seed(recipe: Mapping[str, Any], path: str) -> int:
-    """The seed at a path, or the recipe's own where that is empty."""
-    own = flattened(recipe).get(path)
-    return int(recipe.get("seed", 0) if own is None else own)
 
 
 def _seedless(recipe: Mapping[str, Any]) -> dict[str, Any]:

@@ -58,20 +58,15 @@ def add_object(
         _add_wheels(spec, body, thing, dressed)
     else:
         body.add_freejoint(name="object_joint")
-    _add_hands(spec, robot, timing)
+    for name, wrist, offset in zip(HANDS, robot.wrist_bodies, robot.grip_offset, strict=True):
+        weightless = {"mass": NEGLIGIBLE_MASS, "inertia": [NEGLIGIBLE_MASS] * 3}
+        hand = spec.body(wrist).add_body(name=name, pos=offset, explicitinertial=True, **weightless)
+        hand.add_site(name=name, group=4)
+        add_force_sensor(spec, name, name, timing.substeps)  # of the force through the hand over a control period
     if by_contact:
         _add_palms(spec, scene)
     else:
         _add_grips(spec, body, scene)
-
-
-def _add_hands(spec: Any, robot: Robot, timing: Timing) -> None:
-    """The hands, each with a sensor of the force that passes through it, with a history of one control period."""
-    for name, wrist, place in zip(HANDS, robot.wrist_bodies, robot.grip_offset, strict=True):
-        inertial = {"mass": NEGLIGIBLE_MASS, "inertia": [NEGLIGIBLE_MASS] * 3}
-        hand = spec.body(wrist).add_body(name=name, pos=place, explicitinertial=True, **inertial)
-        hand.add_site(name=name, group=4)
-        add_force_sensor(spec, name, name, timing.substeps)
 
 
 def add_force_sensor(spec: Any, name: str, site: str, kept: int = 0) -> None:

@@ -166,7 +166,11 @@ class GameBatch:
         self._jerk = np.square(action["robot"] - self._action["robot"]).mean(axis=1)
         self._action = action
         self.lower.wanted[:] = self._nominal.with_action(self._nominals, action["robot"])
-        self._human.intend(self._intentions(action["human"]))
+        led = self._human.of_script(pursue(self._skill.pursuit, self.paths, self.now), self.now)
+        blind = self._human.of_script(self._open_loop_motion(self.drawn.pace), self.now)
+        scripted = np.where((self.drawn.kind == KINDS.index(CLOCK))[:, None], blind, led)
+        acting = led + self._human.of_action(action["human"], self.now)
+        self._human.intend(np.where(self.drawn.acts[:, None], acting, scripted))
         self._costs[:] = 0.0
 
     def control(self) -> None:
@@ -248,14 +252,6 @@ class GameBatch:
         unaware = (self.drawn.rule == RULES.index("follow"))[:, None]
         self.buffers["privileged_action"][:] = nominal.action_of(by_rule["lead"], by_rule["follow"]) * unaware
         return np.stack([by_rule[rule] for rule in RULES])[self.drawn.rule, np.arange(self.n)]
-
-    def _intentions(self, action: Array) -> Array:
-        """Intentions of the humans, (n, 5)."""
-        led = self._human.of_script(pursue(self._skill.pursuit, self.paths, self.now), self.now)
-        blind = self._human.of_script(self._open_loop_motion(self.drawn.pace), self.now)
-        scripted = np.where((self.drawn.kind == KINDS.index(CLOCK))[:, None], blind, led)
-        acting = led + self._human.of_action(action, self.now)
-        return np.where(self.drawn.acts[:, None], acting, scripted)
 
     def _open_loop_motion(self, pace: Array | float) -> ObjectMotion:
         seconds = self._decisions / self._skill.frequency

@@ -1,6 +1,5 @@
 """The forces on an environment's robot and object, as arrows to draw."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,20 +40,17 @@ class Force:
         return self.start + METRES_PER_NEWTON * self.force
 
 
-def forces(simulation: Simulation, env: int) -> Iterator[Force]:
+def forces(simulation: Simulation, env: int) -> list[Force]:
     """Forces of the last control period, of at least `SMALLEST_FORCE`."""
-    return (force for force in _all(simulation, env) if np.linalg.norm(force.force) >= SMALLEST_FORCE)
-
-
-def _all(simulation: Simulation, env: int) -> Iterator[Force]:
     state = simulation.state
     outward = BESIDE * state.base_rotation[env, :, 1] * np.array([[1.0], [-1.0]])
+    found = []
     if state.has_object[env]:
-        yield Force("partner", simulation.partner.at[env], state.partner_force[env].copy())
-        yield Force("push", state.object_position[env].copy(), simulation.impulse_force(env))
-        hands = simulation.hand_position(env)
-        for hand in range(2):
-            yield Force("grip", hands[hand] + outward[hand], state.grip_force[env, hand].copy())
-    yield Force("push", state.base_position[env].copy(), state.push_force[env].copy())
-    for foot in range(2):
-        yield Force("ground", state.foot_position[env, foot] + outward[foot], state.foot_force[env, foot].copy())
+        found.append(Force("partner", simulation.partner.at[env], state.partner_force[env].copy()))
+        found.append(Force("push", state.object_position[env].copy(), simulation.impulse_force(env)))
+        places = simulation.hand_position(env) + outward
+        found += [Force("grip", places[hand], state.grip_force[env, hand].copy()) for hand in range(2)]
+    found.append(Force("push", state.base_position[env].copy(), state.push_force[env].copy()))
+    places = state.foot_position[env] + outward
+    found += [Force("ground", places[foot], state.foot_force[env, foot].copy()) for foot in range(2)]
+    return [force for force in found if np.linalg.norm(force.force) >= SMALLEST_FORCE]

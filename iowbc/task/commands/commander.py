@@ -33,7 +33,12 @@ class Commander:
         self._pushing, self._period = pushing, 1.0 / task.control_frequency
         self._largest_step = rate_limits(commands.rates) * self._period
         self.scripted = np.array([script is not None for script in scripts])
-        self._times, self._values = _knots(scripts)
+        nothing = np.zeros(2), np.zeros((2, len(COMMAND)))
+        knots = [nothing if script is None else script.knots() for script in scripts]
+        longest = max(len(times) for times, _ in knots)
+        self._times = np.stack([np.pad(t, (0, longest - len(t)), mode="edge") for t, _ in knots])
+        self._values = np.stack([np.pad(v, ((0, longest - len(v)), (0, 0)), mode="edge") for _, v in knots])
+        """Knots of all scripts, padded with their last one: times (n, k) [s] and commands (n, k, 11)."""
         self._given: Array | None = None
 
     def steer(self, wanted: Array) -> None:
@@ -82,12 +87,3 @@ class Commander:
         if self._given is not None:
             return np.broadcast_to(self._given, memory.goal.shape)
         return interpolate(self._times, self._values, memory.steps * self._period)
-
-
-def _knots(scripts: Sequence[CommandScript | None]) -> tuple[Array, Array]:
-    """Knots of all scripts, padded with their last one: times (n, k) [s] and commands (n, k, 11)."""
-    knots = [script.knots() if script is not None else (np.zeros(2), np.zeros((2, len(COMMAND)))) for script in scripts]
-    longest = max(len(times) for times, _ in knots)
-    times = np.stack([np.pad(t, (0, longest - len(t)), mode="edge") for t, _ in knots])
-    values = np.stack([np.pad(v, ((0, longest - len(v)), (0, 0)), mode="edge") for _, v in knots])
-    return times, values
