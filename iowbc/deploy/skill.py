@@ -87,10 +87,10 @@ class Skill:
         scene: str,
         pushing: bool,
     ) -> None:
-        n, references = controller.robots, ReferenceLayer(controller.robot, controller.contract.references, None)
+        n = controller.robots
+        self._references = ReferenceLayer(controller.robot, controller.contract.references, None)
         self.contract, self._session, self._controller = contract, session, controller
         self._every = round(controller.frequency / contract.frequency)
-        self._references = references
         self._grasp = np.tile(both_wrists(base_grasp(controller.contract.references.grasps, scene)), (n, 1, 1))
         self._largest_step = rate_limits(contract.commands.rates) / controller.frequency
         self._pushing: Mask = np.full(n, pushing)

@@ -21,21 +21,9 @@ if TYPE_CHECKING:
 VIDEOS = "videos"
 """Folder of the films made while training."""
 PANELS = (
-    "episode_seconds",
-    "terminations/fallen",
-    "terminations/dropped",
-    "reward",
-    "curriculum_level",
-    "check/score",
-    "check/survived",
-    "check/E_v",
-    "check/transport",
-    "train/kl",
-    "train/clip_share",
-    "train/learning_rate",
-    "train/std",
-    "train/explained_variance",
-    "train/gain",
+    *("episode_seconds", "terminations/fallen", "terminations/dropped", "reward", "curriculum_level"),
+    *(f"check/{name}" for name in ("score", "survived", "E_v", "transport")),
+    *(f"train/{name}" for name in ("kl", "clip_share", "learning_rate", "std", "explained_variance", "gain")),
     "steps_per_second",
 )
 """Shown in the figure of the learning curves, before the reward's terms."""

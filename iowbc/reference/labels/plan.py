@@ -30,7 +30,11 @@ class SamplePlan:
         self.pitches = np.linspace(sampling.pitch.low, sampling.pitch.high, region.pitches)
         arms = robot.interaction
         self.rest, self.lower, self.upper = robot.default_position[arms], robot.lower[arms], robot.upper[arms]
-        self.uniform_lower, self.uniform_upper = _arm_ranges(robot, recipe)
+        self.uniform_lower, self.uniform_upper = self.lower.copy(), self.upper.copy()
+        names = [robot.joints[index] for index in arms]
+        for name, interval in sampling.joint_ranges.items():
+            place = names.index(name)
+            self.uniform_lower[place], self.uniform_upper[place] = interval.low, interval.high
         self.kinematics = ArmKinematics(robot, ArmReference(posture_gain=0.0))
         self.mirror = interaction_mirror(robot)
         self.grid_arms = np.stack([np.tile(self.rest, (len(self.pitches), 1)), self._carrying()])
@@ -103,16 +107,6 @@ class SamplePlan:
         if by_wrist.any():
             arm[by_wrist] = self.kinematics.solve(start[by_wrist], target[by_wrist])
         return np.asarray(arm)
-
-
-def _arm_ranges(robot: Robot, recipe: ReferenceGenerator) -> tuple[Array, Array]:
-    """Least and greatest arm positions of the uniform share, shape (14,) [rad]."""
-    names = [robot.joints[index] for index in robot.interaction]
-    lower, upper = robot.lower[robot.interaction].copy(), robot.upper[robot.interaction].copy()
-    for name, interval in recipe.sampling.joint_ranges.items():
-        place = names.index(name)
-        lower[place], upper[place] = interval.low, interval.high
-    return lower, upper
 
 
 def _scale(unit: Array, interval: Interval) -> Array:
