@@ -55,7 +55,6 @@ class AdaptedPolicy:
 
         Raises StageFailed if the network's output is not finite.
         """
-        del privileged
         rows = observation.astype(np.float64)
         seen = self._seen({name: rows[:, place] for name, place in self._places.items()})
         self._remember(seen)

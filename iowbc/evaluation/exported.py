@@ -55,7 +55,6 @@ class ExportedPolicy:
             self.controller.reset(which & (scenes == scene), scene=scene)
 
     def act(self, observation: NDArray[np.float32], privileged: NDArray[np.float32]) -> NDArray[np.float32]:
-        del observation, privileged
         batch = self.environment.batch
         targets = self.controller.step(batch.simulation.measured, batch.memory.command)
         expected = batch.targets(targets.action)

@@ -39,7 +39,6 @@ class ModelPolicy:
 
     def act(self, observation: Array, privileged: Array) -> Array:
         """Residual action, shape (n, A), from s_t, shape (n, S). Rows of zeros, which belong to no trial, stay zero."""
-        del privileged
         rows = observation.astype(np.float64)
         action = np.zeros((len(rows), len(self._scale)))
         for index in np.flatnonzero(rows.any(axis=1)):

@@ -105,7 +105,6 @@ class DaggerPolicy:
 
     def act(self, step: int, rows: Array, starts: Mask) -> Decision:
         """See `ExploringPolicy.act`. Records `own`, the student's action, and `answer`, the teacher's, (n, A) each."""
-        del step
         history = self._history.push(rows[:, self.observation], starts)
         answer = self._answer(0, rows, history)
         for place in range(1, len(self.teachers)):

@@ -51,7 +51,6 @@ class TransportEnv(ParallelEnv):  # type: ignore[misc]
 
     def reset(self, seed: int | None = None, options: Values | None = None) -> tuple[dict[str, Array], Values]:
         """Starts an episode: reproducible with a seed, otherwise a new random one."""
-        del options
         if seed is not None:
             self._random = np.random.default_rng(seed)
         self.agents = list(self.possible_agents)

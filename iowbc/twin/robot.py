@@ -113,8 +113,7 @@ class Twin:
         self.simulation.step()
 
     def _hook_position(self) -> Array:
-        place: Array = self._origin + self._frame.reshape(3, 3) @ HOOK
-        return place
+        return self._origin + self._frame.reshape(3, 3) @ HOOK
 
     def _drive(self, kp: Array, kd: Array, target: Array, speed: Array, torque: Array) -> None:
         """Sets gains, scaled by the sampled motor errors, targets and feed-forward torques; a non-finite target keeps

@@ -62,5 +62,4 @@ class Support:
         tension = STIFFNESS * (distance - LENGTH + stretched) - DAMPING * speed
         if tension <= 0.0:
             return np.zeros(3)
-        force: Array = tension * along - SWAY * (velocity - speed * along)
-        return force
+        return tension * along - SWAY * (velocity - speed * along)

@@ -96,5 +96,4 @@ class DrakeWorld(World):
 
 def _greatest(forces: Array) -> Array:
     """The greatest of the forces (2, substeps, 3) on each of a pair, (2, 3)."""
-    greatest: Array = forces[np.arange(2), np.vecdot(forces, forces).argmax(axis=1)]
-    return greatest
+    return forces[np.arange(2), np.vecdot(forces, forces).argmax(axis=1)]
