@@ -25,8 +25,6 @@ class Rolling:
     """Wheels of n crates."""
 
     def __init__(self, batch: Any, layout: ModelIndex, fields: ModelFields, scene: Scene) -> None:
-        if layout.object is None:
-            raise ValueError("a crate is needed to roll")
         self._thing, self._rolling = layout.object, fields.rolling
         self._speeds = slice(layout.joint_speeds.stop, None)
         self._arm, self._slow = scene.yaw_arm, scene.creep

@@ -32,8 +32,6 @@ class OptimalControlMethod:
         self.support, self.recipe, self.problem, self.ocp = support, recipe, recipe.problem, recipe.ocp
         self.state = crocoddyl.StateMultibody(support.model)
         self.actuation = crocoddyl.ActuationModelFloatingBase(self.state)
-        if self.actuation.nu != len(support.robot.support):
-            raise ValueError(f"crocoddyl sees {self.actuation.nu} actuated joints, not {len(support.robot.support)}")
         self.posture = posture_weights(support.robot, recipe.problem)
         self.limits = sole_limits(support.robot, recipe.problem)
 
