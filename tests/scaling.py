@@ -28,6 +28,7 @@ from iowbc.recipe.evaluation.sequences import Segment
 from iowbc.recipe.reading.loading import load_recipe
 from iowbc.recipe.recipe import Recipe
 from iowbc.reference.labels.labelling import LabelTask
+from iowbc.reference.labels.pool import label_all
 from iowbc.robot.description import load_robot, robot_folder
 from iowbc.rollouts.blocks import block_size
 from iowbc.rollouts.rollout_policies import ExploringPolicy
@@ -230,16 +231,10 @@ def _label(spread: "NodeSpread", world: Workload, shards: int) -> None:
     """Label some shards."""
     rg = world.recipe.rg
     with tempfile.TemporaryDirectory(prefix="iowbc-bench-") as folder:
-        label_everywhere(
-            LabelTask(world.folders["robot"], rg, world.recipe.seed, rg.method),
-            range(shards * CHUNK[rg.method]),
-            spread=spread,
-            folder=Path(folder),
-            key="bench",
-            chunk_size=CHUNK[rg.method],
-            interrupted=lambda: False,
-            progress=lambda done, total: None,
-        )
+        task, size = LabelTask(world.folders["robot"], rg, world.recipe.seed, rg.method), CHUNK[rg.method]
+        elsewhere = partial(label_everywhere, spread, task, "bench", size)
+        numbers = range(shards * size)
+        label_all(task, numbers, folder=Path(folder), key="bench", chunk_size=size, elsewhere=elsewhere)
 
 
 def _nothing(recipe: Recipe, trials: Sequence[Trial], *, robot: Path, policy: Path, generator: Path) -> None:

@@ -2,7 +2,7 @@
 
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -46,19 +46,19 @@ def run(job: Job) -> None:
     if wrong := [f"{path}: {text}" for path, text in wrong_ranges(robot, recipe)]:
         raise StageFailed("; ".join(wrong))
     plan = SamplePlan(robot, recipe, seed)
-    label: Callable[..., Shard] = partial(label_all, workers=job.workers)
-    if job.spread is not None:
-        label = partial(label_everywhere, spread=job.spread)
 
     def labelled(indices: Sequence[int], method: Literal["static", "ocp"], folder: str, note: str) -> "Shard":
-        return label(
-            LabelTask(job.robot, recipe, seed, method),
+        task, size, spread = LabelTask(job.robot, recipe, seed, method), CHUNK[method], job.spread
+        return label_all(
+            task,
             indices,
             folder=job.work / folder,
             key=job.key,
-            chunk_size=CHUNK[method],
+            chunk_size=size,
+            workers=job.workers,
             interrupted=job.interrupted,
             progress=lambda done, total: job.report.progress(done, total, note),
+            elsewhere=None if spread is None else partial(label_everywhere, spread, task, job.key, size),
         )
 
     began = time.monotonic()
@@ -113,36 +113,14 @@ def run(job: Job) -> None:
 
 
 def label_everywhere(
-    task: "LabelTask",
-    indices: Sequence[int],
-    *,
-    spread: "NodeSpread",
-    folder: Path,
-    key: str,
-    chunk_size: int,
-    interrupted: Callable[[], bool],
-    progress: Callable[[int, int], None],
-) -> "Shard":
-    """Like `label_all`, but other machines make the missing shards, several per piece."""
-    from iowbc.reference.labels.pool import label_all
-    from iowbc.reference.labels.shards import cut, read_shard
-
-    folder.mkdir(parents=True, exist_ok=True)
-    chunks, paths = cut(indices, chunk_size, folder)
-    missing = [number for number, path in enumerate(paths) if read_shard(path, key, chunks[number]) is None]
-    size = max(1, len(missing) // (SHARES * spread.width))
-    shares = [missing[start : start + size] for start in range(0, len(missing), size)]
-    ready = len(indices) - sum(len(chunks[number]) for number in missing)
-    progress(ready, len(indices))
-    calls = [(task, [chunks[number] for number in share], key, chunk_size) for share in shares]
-    for place, shards in spread(label_share, calls, {"robot": task.robot}):
-        for number, content in zip(shares[place], shards, strict=True):
-            paths[number].write_bytes(content)
-            ready += len(chunks[number])
-        progress(ready, len(indices))
-    return label_all(
-        task, indices, folder=folder, key=key, chunk_size=chunk_size, interrupted=interrupted, progress=progress
-    )
+    spread: "NodeSpread", task: "LabelTask", key: str, chunk_size: int, chunks: Sequence[Sequence[int]]
+) -> Iterator[tuple[int, bytes]]:
+    """Shards of chunks made on other machines, several per piece: place of the chunk, and content of the file."""
+    size = max(1, len(chunks) // (SHARES * spread.width))
+    shares = [range(start, min(start + size, len(chunks))) for start in range(0, len(chunks), size)]
+    calls = [(task, [chunks[place] for place in share], key, chunk_size) for share in shares]
+    for number, shards in spread(label_share, calls, {"robot": task.robot}):
+        yield from zip(shares[number], shards, strict=True)
 
 
 def label_share(

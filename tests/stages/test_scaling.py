@@ -25,7 +25,7 @@ def test_rates_efficiencies_times_and_sizes_are_named(monkeypatch: pytest.Monkey
         yield SimpleNamespace(spread=lambda paths: Backwards())
 
     monkeypatch.setattr(scaling, "connected_nodes", here)
-    monkeypatch.setattr(scaling, "label_everywhere", lambda *words, **settings: None)
+    monkeypatch.setattr(scaling, "label_all", lambda *words, **settings: None)
     monkeypatch.setattr(scaling, "_timed", timed)
     monkeypatch.setattr(scaling, "SHARES", 1)
     monkeypatch.setattr(scaling, "TRIALS", 2)

@@ -9,7 +9,7 @@ import os
 import signal
 import threading
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
@@ -65,8 +65,10 @@ def label_all(
     workers: int = 1,
     interrupted: Callable[[], bool] = lambda: False,
     progress: Callable[[int, int], None] = lambda done, total: None,
+    elsewhere: Callable[[list[list[int]]], Iterator[tuple[int, bytes]]] | None = None,
 ) -> Shard:
-    """Labels the samples with these numbers. The result does not depend on the number of workers.
+    """Labels the samples with these numbers. The result does not depend on the number of workers. `elsewhere`: first
+    makes the missing shards of these chunks on other machines, and yields the place and the file content of each.
 
     Shards in `folder` that belong to `key` are reused, others recomputed. Raises `Interrupted` when `interrupted()`
     turns true, WorkerFailed when a worker fails in Python or cannot start, or when too many are killed.
@@ -74,8 +76,15 @@ def label_all(
     folder.mkdir(parents=True, exist_ok=True)
     chunks, paths = cut(indices, chunk_size, folder)
     done = {number: shard for number, path in enumerate(paths) if (shard := read_shard(path, key, chunks[number]))}
-    queue = _Queue([number for number in range(len(chunks)) if number not in done])
     progress(sum(len(chunks[number]) for number in done), len(indices))
+    missing = [number for number in range(len(chunks)) if number not in done]
+    for place, content in elsewhere([chunks[number] for number in missing]) if elsewhere is not None else ():
+        chunk = missing[place]
+        paths[chunk].write_bytes(content)
+        if shard := read_shard(paths[chunk], key, chunks[chunk]):
+            done[chunk] = shard
+        progress(sum(len(chunks[number]) for number in done), len(indices))
+    queue = _Queue([number for number in missing if number not in done])
     team = [_start_worker(task, key) for _ in range(min(max(workers, 1), len(queue.waiting)))]
     try:
         while len(done) < len(chunks):

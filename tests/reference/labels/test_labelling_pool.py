@@ -3,6 +3,7 @@
 import shutil
 import signal
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -65,11 +66,10 @@ def test_each_sample_is_labelled_or_has_a_reason(expected: Shard) -> None:
 def test_shards_of_other_machines_are_the_same_and_only_missing_ones_are_made(shards: Path, expected: Shard) -> None:
     for number in (1, 2, 4):
         (shards / f"{number:05d}.shard").unlink()
-    spread = Backwards()
-    settings: dict[str, Any] = {"interrupted": lambda: False, "progress": lambda done, total: None}
+    spread: Any = Backwards()
     task: Any = DoubleTask()
-    made = label_everywhere(task, range(COUNT), spread=spread, folder=shards, key="key", chunk_size=CHUNK, **settings)
-    assert same(made, expected)
+    elsewhere = partial(label_everywhere, spread, task, "key", CHUNK)
+    assert same(run(shards, task, elsewhere=elsewhere), expected)
     assert spread.calls == 3
 
 
