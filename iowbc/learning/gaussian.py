@@ -33,3 +33,11 @@ def std_places(actions: int, mirror: MirrorMap | None) -> NDArray[np.int64]:
     """Index of each action's standard deviation, (A,); actions that the mirror swaps share one."""
     own = np.arange(actions) if mirror is None else np.minimum(np.arange(actions), mirror.permutation)
     return np.asarray(np.unique(own, return_inverse=True)[1], np.int64)
+
+
+def autoregressive(noise: Tensor, correlation: float) -> Tensor:
+    """Standard normal noise (T, ...), independent over time, as noise of this correlation between consecutive steps."""
+    found = noise.clone()
+    for step in range(1, len(noise) if correlation > 0.0 else 0):
+        found[step] = correlation * found[step - 1] + math.sqrt(1.0 - correlation**2) * noise[step]
+    return found

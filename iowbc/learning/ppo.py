@@ -21,7 +21,7 @@ from torch import Tensor
 from iowbc.arrays import Array
 from iowbc.learning.as_numpy import acting_policy
 from iowbc.learning.computing import ParallelBatch, reduced
-from iowbc.learning.gaussian import divergence, entropy, log_density
+from iowbc.learning.gaussian import autoregressive, divergence, entropy, log_density
 from iowbc.learning.groups import drawn_leaders, without_common_part
 from iowbc.learning.history_actor import student_architecture
 from iowbc.learning.networks import Mirrors, mirrors_as_json
@@ -132,7 +132,8 @@ class Learner:
         with torch.inference_mode():
             self.normalization.move(policy.normalizer)
             acting = policy if self._on_cpu else copy.deepcopy(policy).cpu()
-            noise = torch.randn(settings.rollout, env.num_envs, len(acting.log_std)) * torch.exp(acting.log_std)
+            normal = torch.randn(settings.rollout, env.num_envs, len(acting.log_std))
+            noise = autoregressive(normal, settings.noise_correlation) * torch.exp(acting.log_std)
             rollout_policy = ExploringPolicy(acting_policy(acting), noise.numpy(), block_size(env.num_envs))
             found = env.roll(rollout_policy, settings.rollout)
         rolled = time.perf_counter()

@@ -145,6 +145,9 @@ class Teacher(PPO):
     `std_end`. It reduces exploration even where the gradient does not. Empty: no such bound."""
     std_end: float = Field(default=0.2, gt=0)
     """Final upper bound on the standard deviation."""
+    noise_correlation: float = Field(default=0.0, ge=0.0, lt=1.0, json_schema_extra=LATER)
+    """Correlation of the exploration noise between consecutive steps, as of a first-order autoregressive process, while
+    the densities of PPO remain those of independent noise. 0: independent, as in the paper."""
     restart: Restart | None = Field(default=None, json_schema_extra=LATER)
     """Warm restart of the exploration; empty: none."""
     average_half_life: int | None = Field(default=None, ge=1, le=10**12, json_schema_extra=LATER)

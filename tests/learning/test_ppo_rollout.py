@@ -3,7 +3,7 @@ import math
 import numpy as np
 import torch
 
-from iowbc.learning.gaussian import divergence, entropy, log_density
+from iowbc.learning.gaussian import autoregressive, divergence, entropy, log_density
 from iowbc.learning.rollout import advantages
 
 
@@ -58,3 +58,14 @@ def test_density_entropy_and_divergence_are_those_of_torch() -> None:
 def test_the_closed_form_does_not_depend_on_which_actions_were_drawn() -> None:
     mean, other, log_std = torch.zeros(1, 2), torch.tensor([[0.1, 0.0]]), torch.full((2,), math.log(0.5))
     assert math.isclose(float(divergence(mean, log_std, other, log_std)), 0.01 / (2 * 0.25), rel_tol=1e-5)
+
+
+def test_correlated_noise_is_standard_normal_at_every_step_and_forgets_geometrically() -> None:
+    torch.manual_seed(0)
+    independent = torch.randn(30, 4000, 3)
+    noise = autoregressive(independent, 0.8)
+    torch.testing.assert_close(noise.square().mean((1, 2)), torch.ones(30), rtol=0, atol=0.05)
+    for lag in (1, 3):
+        found = (noise[lag:] * noise[:-lag]).mean((1, 2))
+        torch.testing.assert_close(found, torch.full_like(found, 0.8**lag), rtol=0, atol=0.05)
+    torch.testing.assert_close(autoregressive(independent, 0.0), independent, rtol=0, atol=0)
