@@ -102,7 +102,7 @@ def play(
         source, actor = _driven(store, console, word, stage, plan)
         _serve(console, page, Session(source, request), evaluated=actor)
     else:
-        _play_episode(named_source(store, console, word, stage, plan), request, console)
+        _play_episode(named_source(store, console, word, stage, scene, plan), request, console)
 
 
 def _play_episode(source: "Source", request: PlayRequest, console: Console) -> None:
@@ -186,7 +186,7 @@ def _driven(store: Store, console: Console, word: str, stage: str | None, plan: 
         require_whole(store.runs, [played])
         source = whole_source(store, played)
     else:
-        source = named_source(store, console, word, stage, plan)
+        source = named_source(store, console, word, stage, None, plan)
     try:
         return source, None if evaluation is None else evaluated_actor(store, evaluation)
     except UsageError as error:

@@ -80,9 +80,11 @@ def playable_skill(store: Store, skill: Artifact, scene: str) -> "tuple[Specific
     return world, load_student(student.folder, world), robot, first[scene]
 
 
-def named_source(store: Store, console: Console, word: str, stage: str | None, plan: Run) -> "Source":
+def named_source(
+    store: Store, console: Console, word: str, stage: str | None, scene: str | None, plan: Run
+) -> "Source":
     """The source that a word, with its plan, and `--stage` denote; prints a line if it is still in training. Raises
-    `UsageError`.
+    `UsageError`, also for a `scene` that its recipe lacks.
 
     A recipe file denotes the artifacts that `iowbc plan` reports as cached. The section `eval` of that file, or of the
     recipe's last run for a name, sets how they are played.
@@ -109,6 +111,9 @@ def named_source(store: Store, console: Console, word: str, stage: str | None, p
     require_whole(store.runs, [artifact])
     if artifact.published:
         tell(console, f"{artifact.manifest.stage} of {artifact.manifest.recipe}, as it came with the repository")
+    scenes = artifact.recipe.get("simulation", {}).get("scenes", {})
+    if scene is not None and scenes:
+        require_known(scene, "scene", [*scenes, *(asked.scenes if asked else ())])
     source = whole_source(store, artifact)
     return source if asked is None else with_evaluation(source, asked)
 

@@ -54,7 +54,7 @@ def test_a_training_without_a_checkpoint_yet_is_told_in_one_sentence(folder: Pat
     store, console = Store(Runs(folder / "runs")), Console(file=io.StringIO())
     Workspace(store.runs, "teacher", "f" * 64).begin("third", False, {})
     with pytest.raises(UsageError, match=r"^teacher of third was interrupted; there is neither a checkpoint that can"):
-        named_source(store, console, "third/teacher", None, UNPLANNED)
+        named_source(store, console, "third/teacher", None, None, UNPLANNED)
     assert not console.file.getvalue()  # type: ignore[attr-defined]
 
 
@@ -126,10 +126,10 @@ def test_a_recipe_that_plans_cached_is_played_by_its_own_sequence_and_film_setti
     )
     store, console = Store(Runs(tmp_path / "runs")), Console(file=io.StringIO())
     plan = planned(store, str(own))
-    source = named_source(store, console, str(own), None, plan)
+    source = named_source(store, console, str(own), None, "wide_box", plan)
     assert source.policy.parent.name == "distill"
     assert requested_episode(source.world.recipe, PlayRequest()).duration == 5.0
     assert requested_episode(source.world.recipe, PlayRequest(scene="wide_box")).scene == "wide_box"
     assert source.world.recipe.eval.video.width == 96
     with pytest.raises(UsageError, match="did you mean 'wide_box'"):
-        requested_episode(source.world.recipe, PlayRequest(scene="wide_bx"))
+        named_source(store, console, str(own), None, "wide_bx", plan)
