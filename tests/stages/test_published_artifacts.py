@@ -38,6 +38,7 @@ PUBLISHED_TO = {
     "compliant_merged": "export",
     "compliant_merged_seed_1": "eval",
     "compliant_merged_seed_2": "eval",
+    "compliant_correlated": "teacher",
     "drake": "teacher",
     "experts/quick": "distill",
     "experts/firm_push": "teacher",
