@@ -9,8 +9,16 @@ from iowbc.stages.inputs import generator_stage, not_privileged
 from iowbc.stages.training import rolls_elsewhere, train
 
 PANELS = (
-    *("kl", "kl_at_shared_std", "auxiliary_error", "std", "action_rmse", "action_agreement"),
-    *("episode_seconds", "terminations/fallen", "teacher_share", "reward"),
+    "kl",
+    "kl_at_shared_std",
+    "auxiliary_error",
+    "std",
+    "action_rmse",
+    "action_agreement",
+    "episode_seconds",
+    "terminations/fallen",
+    "teacher_share",
+    "reward",
 )
 """Shown in the figure of the learning curves."""
 FACTS = ("object_mass", "base_linear_velocity")

@@ -11,8 +11,10 @@ from iowbc.stages.inputs import generator_stage, policy_stage, without_student
 from iowbc.stages.training import STATE, leave_extendable, train
 
 PANELS = (
-    *("scripted/success", "scripted/partner_force_p90", "scripted/reward", "scripted/fallen"),
-    *("scripted/partner_work", "scripted/path_error"),
+    *(
+        f"scripted/{name}"
+        for name in ("success", "partner_force_p90", "reward", "fallen", "partner_work", "path_error")
+    ),
     *(f"learnt/{name}" for name in ("success", "partner_force_p90", "reward")),
     *("robot/kl", "robot/std", "robot/learning_rate", "human/kl", "human/std", "human/learning_rate"),
     *("train/imitation_error", "train/explained_variance", "train/value_loss", "steps_per_second"),
@@ -72,9 +74,19 @@ def _note(values: Mapping[str, float]) -> str:
 GOLDEN_DECISIONS = 10
 """Decisions of all games whose observations are the golden vectors."""
 KINDS = ("scripted", "learnt")
-GAME = (
-    *("skill.frequency", "skill.tasks", "skill.goal_known", "skill.robot", "skill.human", "skill.pursuit"),
-    *("skill.finish", "skill.reward", "skill.partners.training"),
+GAME = tuple(
+    f"skill.{part}"
+    for part in (
+        "frequency",
+        "tasks",
+        "goal_known",
+        "robot",
+        "human",
+        "pursuit",
+        "finish",
+        "reward",
+        "partners.training",
+    )
 )
 """Dotted recipe paths that decide how a game goes."""
 
