@@ -1,9 +1,12 @@
 """Stage `distill`: the student acts, the teacher labels the states with actions, the student imitates (DAgger)."""
 
 from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
 
 from iowbc.errors import StageFailed
 from iowbc.pipeline.stage import ExternalInput, Job, Stage
+from iowbc.recipe.distillation import Distillation
 from iowbc.recipe.recipe import Recipe
 from iowbc.stages.inputs import generator_stage, not_privileged
 from iowbc.stages.training import rolls_elsewhere, train
@@ -70,11 +73,7 @@ def run(job: Job) -> None:
         for folder, one in zip(folders, abouts, strict=True):
             require_layout(folder, one, layout.describe())
             if one["kind"] == "student":
-                sizes = {name: getattr(settings, name) for name in ("history", "frame_features", "latent")}
-                for name, size in (sizes | {"observation": seen.size}).items():
-                    if (own_size := one["architecture"][name]) != size:
-                        text = f"this expert's {name} has size {own_size}, that of distill {size}"
-                        raise StageFailed(f"{folder}: {text}")
+                _require_sizes(folder, one["architecture"], settings, seen.size)
         unseen = layout.state.parts[len(seen.parts) :]
         unseen_mirror = side_by_side([*(part.kind(robot) for part in unseen), layout.extra.mirror])
         rows = Rows(
@@ -100,6 +99,14 @@ def run(job: Job) -> None:
     about = {"layout": layouts, "curriculum": curriculum}
     save_network(training.network, training.architecture, job.out, "student", about)
     job.summarize(curves.write_artifact(job.out, f"{recipe.name}: student", PANELS))
+
+
+def _require_sizes(folder: Path, expert: Mapping[str, Any], settings: Distillation, observation: int) -> None:
+    """Raises StageFailed for an expert that is a student with a history or an encoder of other sizes."""
+    sizes = {name: getattr(settings, name) for name in ("history", "frame_features", "latent")}
+    for name, size in (sizes | {"observation": observation}).items():
+        if expert[name] != size:
+            raise StageFailed(f"{folder}: this expert's {name} has size {expert[name]}, that of distill {size}")
 
 
 def _note(values: Mapping[str, float]) -> str:

@@ -1,41 +1,38 @@
 """Stage `export`: the control step as an ONNX graph, its contract and golden vectors, checked and tried out."""
 
-from functools import partial
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from iowbc.errors import Interrupted, StageFailed
 from iowbc.pipeline.stage import Job, Stage
+from iowbc.recipe.export import Export
 from iowbc.stages.inputs import generator_stage, policy_stage, without_student
+
+if TYPE_CHECKING:
+    from iowbc.deploy.controller import Values
+    from iowbc.evaluation.acceptance import Accepted
+    from iowbc.export.graph import ControllerGraph
+    from iowbc.learning.networks import StudentNetwork
 
 
 def run(job: Job) -> None:
-    """Export, compare the graph with torch, and play the acceptance trials with the exported controller. Raises
-    StageFailed for the first gate that is missed: parity, joint targets, acceptance."""
+    """Export, compare the graph with torch, and play the acceptance trials with the exported controller."""
     import numpy as np
     import torch
 
-    from iowbc.control.observation import OBJECT, observation_layout
-    from iowbc.control.references import ReferenceLayer
-    from iowbc.deploy import contract, controller, exported_folder
+    from iowbc.deploy import contract, exported_folder
     from iowbc.deploy.timing import step_seconds
     from iowbc.evaluation.acceptance import golden_inputs, run_acceptance, try_out_network
     from iowbc.export import golden
     from iowbc.export.folder import write_folder
-    from iowbc.export.graph import ControllerGraph
-    from iowbc.export.onnx_graph import run_torch
     from iowbc.learning.acting import policy_of
-    from iowbc.learning.storage import load_student_network, require_layout
-    from iowbc.robot.description import load_robot
+    from iowbc.learning.storage import load_student_network
     from iowbc.task.specification import Specification
 
     torch.set_num_threads(1)  # as on the robot, where the controller uses one thread
-    task, settings, rg = job.recipe.task, job.recipe.export, job.inputs.get("rg-fit")
-    robot, trained = load_robot(job.robot), job.inputs[policy_stage(job.recipe)]
-    student, about = load_student_network(trained)
-    sees_object = OBJECT[0].name in {part["name"] for part in about["layout"]["observation"]}
-    references = ReferenceLayer(robot, task.references, rg)
-    layout, history = observation_layout(robot, sees_object), int(about["architecture"]["history"])
-    require_layout(trained, about, {"observation": layout.describe()})
-    graph = ControllerGraph(student, robot, task, layout, history, references)
+    rg, (student, about) = job.inputs.get("rg-fit"), load_student_network(job.inputs[policy_stage(job.recipe)])
+    graph = _graph(job, student, about)
     sources = {stage: folder.name for stage, folder in job.inputs.items()} | {"export": job.key}
     statement = write_folder(job.out, graph, job.recipe, rg, sources)
     try:
@@ -45,13 +42,8 @@ def run(job: Job) -> None:
         steps = golden_inputs(world, job.out, job.interrupted)
     except Interrupted as stopped:
         raise Interrupted(f"export: {stopped}; it starts anew, which takes less than a minute") from stopped
-    inputs = golden.stacked(steps)
-    expected = golden.played(partial(run_torch, graph.settle), partial(run_torch, graph.step), inputs)
-    files = (job.out / name for name in (exported_folder.SETTLE, exported_folder.STEP))
-    settle, step = (partial(controller.run, controller.open_session(file)) for file in files)
-    golden.write_golden(inputs, expected, job.out / exported_folder.GOLDEN)
-    differences = golden.largest_difference(expected, golden.played(settle, step, inputs))
-    seconds = step_seconds(job.out, settings.timing_steps)[:, 0]
+    differences = _parity(graph, golden.stacked(steps), job.out)
+    seconds = step_seconds(job.out, job.recipe.export.timing_steps)[:, 0]
     metrics = {
         "parity": max(differences.values()),
         "target_difference": policy.largest_difference,
@@ -76,15 +68,52 @@ def run(job: Job) -> None:
     for place, each in enumerate(played):
         differ = metrics[f"errors_differ/{place}"]
         job.report.say(f"{each.sentence}; its errors differ from the torch student's by {differ:.2%} at most")
+    _require_gates(job.recipe.export, differences, policy.largest_difference, played)
+
+
+def _graph(job: Job, student: "StudentNetwork", about: Mapping[str, Any]) -> "ControllerGraph":
+    from iowbc.control.observation import OBJECT, observation_layout
+    from iowbc.control.references import ReferenceLayer
+    from iowbc.export.graph import ControllerGraph
+    from iowbc.learning.storage import require_layout
+    from iowbc.robot.description import load_robot
+
+    robot, task = load_robot(job.robot), job.recipe.task
+    sees_object = OBJECT[0].name in {part["name"] for part in about["layout"]["observation"]}
+    references = ReferenceLayer(robot, task.references, job.inputs.get("rg-fit"))
+    layout, history = observation_layout(robot, sees_object), int(about["architecture"]["history"])
+    require_layout(job.inputs[policy_stage(job.recipe)], about, {"observation": layout.describe()})
+    return ControllerGraph(student, robot, task, layout, history, references)
+
+
+def _parity(graph: "ControllerGraph", inputs: "Values", out: Path) -> dict[str, float]:
+    """Largest differences between torch and onnxruntime by output; leaves the golden vectors."""
+    from functools import partial
+
+    from iowbc.deploy import exported_folder
+    from iowbc.deploy.controller import open_session, run
+    from iowbc.export import golden
+    from iowbc.export.onnx_graph import run_torch
+
+    expected = golden.played(partial(run_torch, graph.settle), partial(run_torch, graph.step), inputs)
+    settle, step = (partial(run, open_session(out / name)) for name in (exported_folder.SETTLE, exported_folder.STEP))
+    golden.write_golden(inputs, expected, out / exported_folder.GOLDEN)
+    return golden.largest_difference(expected, golden.played(settle, step, inputs))
+
+
+def _require_gates(
+    settings: Export, differences: Mapping[str, float], target_difference: float, played: "Sequence[Accepted]"
+) -> None:
+    """Raises StageFailed for the first gate that is missed: parity, joint targets, acceptance."""
     worst = max(differences, key=lambda name: differences[name])
     if not differences[worst] <= settings.parity_tolerance:
         raise StageFailed(
             f"parity: output {worst} differs by {differences[worst]:.2e} between torch and onnxruntime, "
             f"export.parity_tolerance is {settings.parity_tolerance:.0e}; try another export.opset or raise it"
         )
-    if not policy.largest_difference <= settings.target_tolerance:
+    if not target_difference <= settings.target_tolerance:
         raise StageFailed(
-            f"the controller's joint targets differ by {policy.largest_difference:.2e} rad from the simulation's own, "
+            f"the controller's joint targets differ by {target_difference:.2e} rad from the simulation's own, "
             f"export.target_tolerance is {settings.target_tolerance:.0e}: its arm kinematics, reference generator, "
             "gait clock or action scale are not those of the task: the code of one of the two has changed"
         )

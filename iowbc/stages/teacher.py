@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, closing
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from iowbc.errors import StageFailed
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from iowbc.evaluation.trials.quick import QuickEvaluation
     from iowbc.learning.teacher import TeacherTraining
     from iowbc.task.specification import Specification
+    from iowbc.task.vector.vector_env import VectorEnv
 
 VIDEOS = "videos"
 """Folder of the films made while training."""
@@ -53,7 +55,7 @@ def run(job: Job) -> None:
     from iowbc.evaluation.films import TrainingFilms
     from iowbc.learning.computing import prepare_process
     from iowbc.learning.environments import HistoryEnvironments
-    from iowbc.learning.storage import load_network, save_network
+    from iowbc.learning.storage import save_network
     from iowbc.learning.teacher import TeacherTraining
     from iowbc.processes import available_cores
     from iowbc.robot.description import load_robot
@@ -89,13 +91,7 @@ def run(job: Job) -> None:
             say=job.report.say,
         )
         if START in job.inputs:
-            start, before = load_network(job.inputs[START])
-            if before["layout"] != environments.layout.describe():
-                path, _ = settings.beginning
-                raise StageFailed(f"{path}: that policy observes something else; leave the observation as it was")
-            training.begin(start)
-            if "curriculum" in before:  # missing in students of earlier versions
-                environments.set_curriculum(before["curriculum"])
+            _begin(training, environments, job.inputs[START])
         look = None if films is None else partial(_film, job, training, films)
         curves = train(job, training, settings.checkpoint_every, _note, look)
         leave_extendable(job, training)
@@ -111,6 +107,19 @@ def run(job: Job) -> None:
     figures = curves.write_artifact(job.out, f"{recipe.name}: teacher", PANELS, terms)
     kept = {"best_score": training.best.score} if settings.check.every is not None else {}
     job.summarize(kept | figures)
+
+
+def _begin(training: "TeacherTraining", environments: "VectorEnv", start: Path) -> None:
+    """Initialise a training from another one's network. Raises StageFailed if the observations differ."""
+    from iowbc.learning.storage import load_network
+
+    network, about = load_network(start)
+    if about["layout"] != environments.layout.describe():
+        path, _ = training.settings.beginning
+        raise StageFailed(f"{path}: that policy observes something else; leave the observation as it was")
+    training.begin(network)
+    if "curriculum" in about:  # missing in students of earlier versions
+        environments.set_curriculum(about["curriculum"])
 
 
 def check_of(world: "Specification", workers: int) -> "QuickEvaluation":
