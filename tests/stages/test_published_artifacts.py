@@ -39,6 +39,7 @@ PUBLISHED_TO = {
     "compliant_merged_seed_1": "eval",
     "compliant_merged_seed_2": "eval",
     "compliant_correlated": "teacher",
+    "compliant_correlated_seed_1": "teacher",
     "drake": "teacher",
     "experts/quick": "distill",
     "experts/firm_push": "teacher",
