@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 SKILL = "skill"
 CHECKPOINT = Path("scratch", "training.checkpoint")
 UNPLANNED = Run("", {})
-"""What a key, a name or a folder plans: nothing."""
+"""Plan of a key, a name or a folder: no recipe and no artifacts."""
 
 
 def planned(store: Store, word: str) -> Run:

@@ -36,8 +36,11 @@ def std_places(actions: int, mirror: MirrorMap | None) -> NDArray[np.int64]:
 
 
 def autoregressive(noise: Tensor, correlation: float) -> Tensor:
-    """Standard normal noise (T, ...), independent over time, as noise of this correlation between consecutive steps."""
+    """Stationary first-order autoregressive noise, standard normal at each step, from independent noise (T, ...).
+
+    correlation: between consecutive steps.
+    """
     found = noise.clone()
-    for step in range(1, len(noise) if correlation > 0.0 else 0):
+    for step in range(1, len(noise)):
         found[step] = correlation * found[step - 1] + math.sqrt(1.0 - correlation**2) * noise[step]
     return found

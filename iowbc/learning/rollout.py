@@ -6,7 +6,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from iowbc.arrays import Array, Mask
+from iowbc.arrays import Array, Mask, places
 
 SINGLE = ("log_density", "value", "advantage", "target")
 """Scalar columns."""
@@ -24,9 +24,8 @@ class Samples:
     ) -> None:
         acting = dict.fromkeys(("action", "mean"), actions)
         sizes = {"observation": observation, **acting, **dict.fromkeys(SINGLE, 1)}
-        ends = np.cumsum(list(sizes.values())).tolist()
-        self.places = {name: slice(end - size, end) for (name, size), end in zip(sizes.items(), ends, strict=True)}
-        self.rows = torch.zeros(steps, environments, ends[-1], device=device)
+        self.places = places(sizes)
+        self.rows = torch.zeros(steps, environments, sum(sizes.values()), device=device)
         self.columns = self.named(self.rows)
 
     def named(self, rows: Tensor) -> dict[str, Tensor]:
