@@ -88,13 +88,13 @@ def test_rows_of_several_trainings_say_so_and_are_paired_training_by_training() 
     assert "trainings" not in error_table(aggregate(RIVAL), "lifting").caption
     assert len(paired(trials, "WBC", "IO-WBC")) == 10, "the first training of each"
     assert difference_table(trials) is not None
-    assert {"interquartile", "differences"} <= {table.name for table in report_tables(trials, summary, 0.8, {})}
-    assert "interquartile" not in {table.name for table in report_tables(RIVAL, aggregate(RIVAL), 0.8, {})}
+    assert {"interquartile", "differences"} <= {table.name for table in report_tables(trials, summary, 0.8)}
+    assert "interquartile" not in {table.name for table in report_tables(RIVAL, aggregate(RIVAL), 0.8)}
 
 
 def test_every_cell_of_the_papers_tables_has_ours_theirs_and_the_ratio() -> None:
     trials = pd.concat([training("0", {0.0: 5, 1.0: 5, 8.0: 0}), RIVAL.assign(variant="load-agnostic")])
-    table = paper_table(aggregate(trials), {"load-agnostic": "WBC"})
+    table = paper_table(aggregate(trials, {"load-agnostic": "WBC"}))
     assert table is not None
     lines = markdown(table).splitlines()
     assert "| II, lifting | IO-WBC | 0 kg | 5/5 | 0.300 / 0.125 = 2.40 |" in lines[4]

@@ -122,9 +122,12 @@ def test_the_joint_that_is_strained_most_is_named() -> None:
 
 
 def test_the_papers_numbers_are_found_by_label_and_left_out_where_it_knows_none() -> None:
-    summary = aggregate(trials_of("full", "pushing", {30.0: 5}))
-    assert "| 0.131 (2.29) |" in markdown(error_table(summary, "pushing", {"full": "IO-WBC"}))
-    without = error_table(summary, "pushing", {"full": "mine"})
+    trials = trials_of("full", "pushing", {30.0: 5})
+    summary = aggregate(trials, {"full": "IO-WBC"})
+    assert "| 0.131 (2.29) |" in markdown(error_table(summary, "pushing"))
+    panel = errors_against_mass(summary, "pushing").axes[0]
+    assert any(line.get_linestyle() == ":" for line in panel.lines), "the paper's numbers"
+    without = error_table(aggregate(trials, {"full": "mine"}), "pushing")
     assert "paper E_" not in markdown(without)
     assert {len(row) for row in without.rows} == {len(without.head)}
 

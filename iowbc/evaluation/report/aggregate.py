@@ -1,5 +1,7 @@
 """Summary of the long table of trials: one row per variant, suite, case, mass and impulse."""
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -33,6 +35,7 @@ WORLD = "trial"
 """Column that identifies the world. Trials of one number have the same random draws and commands at every mass, in
 every suite and with every training; intervals treat them as one cluster."""
 GROUP = ["variant", "kind", "suite", "case", "mass", "impulse"]
+NO_LABELS: Mapping[str, str] = MappingProxyType({})
 
 
 def case_names(rows: pd.DataFrame) -> "pd.Series[str]":
@@ -41,14 +44,14 @@ def case_names(rows: pd.DataFrame) -> "pd.Series[str]":
     return rows["case"].where(suites == 1, rows["suite"] + " " + rows["case"])
 
 
-def aggregate(trials: pd.DataFrame) -> pd.DataFrame:
+def aggregate(trials: pd.DataFrame, labels: Mapping[str, str] = NO_LABELS) -> pd.DataFrame:
     """One row per combination of `GROUP`, by suite and case in order of appearance, mass, impulse, and the paper's
-    order of variants.
+    order of variants. labels: the paper's names of variants with another name here.
 
-    Columns: number of `trainings`, pooled; `trials`, `survived`, `succeeded`; `held` (trials with an object in the
-    hands) and `carried` (those that carried its weight); `pushed` and `kept` (those that did not lose the object);
-    success `rate` with its Wilson interval `rate_low`, `rate_high`; means of all metrics over surviving trials, or over
-    all trials for `OVER_ALL_TRIALS`; `<error>_half`, half the 95 % interval of an error; `norm` of the four errors;
+    Columns: `name_in_paper`, or else the name here; number of `trainings`, pooled; `trials`, `survived`, `succeeded`;
+    `held` (trials with an object in the hands) and `carried` (those that carried its weight); `pushed` and `kept`
+    (those that did not lose the object); success `rate` with its Wilson interval `rate_low`, `rate_high`; means of all
+    metrics over surviving trials, or over all trials for `OVER_ALL_TRIALS`; `<error>_half`, half the 95 % interval of an error; `norm` of the four errors;
     `torque_rms` of the joint with the largest mean, and its name `torque_rms_joint`. Intervals use `WORLD` as clusters.
     NaN if no trial survived ("Fails" in the tables), for half widths also if only one did. Metrics that trials of an
     earlier version lack are missing here, too.
@@ -60,6 +63,7 @@ def aggregate(trials: pd.DataFrame) -> pd.DataFrame:
     metrics = [name for name in numbers if not name.startswith("drawn_")]
     groups = trials.groupby(GROUP, sort=False)
     table = pd.DataFrame([_row(dict(zip(GROUP, key, strict=True)), group, metrics) for key, group in groups])
+    table["name_in_paper"] = table["variant"].replace(dict(labels))
     ranks = {name: list(dict.fromkeys(trials[name])) for name in ("suite", "case")} | {"variant": variants_of(trials)}
     order = ["suite", "case", "mass", "impulse", "variant"]
     return table.sort_values(

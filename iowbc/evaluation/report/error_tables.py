@@ -1,8 +1,5 @@
 """Tracking error tables in the form of the paper's II and III, with its numbers and a robot that stands still."""
 
-from collections.abc import Mapping
-from types import MappingProxyType
-
 import numpy as np
 import pandas as pd
 
@@ -31,24 +28,19 @@ NUMBERS = {"lifting": "II", "pushing": "III"}
 """The paper's table number of each kind."""
 SWEPT = (*NUMBERS, "squeezing")
 """Kinds of mass sweeps; the paper has no table of the last."""
-NO_LABELS: Mapping[str, str] = MappingProxyType({})
 
 
-def error_table(
-    summary: pd.DataFrame, suite: str, labels: Mapping[str, str] = NO_LABELS, name: str | None = None
-) -> Table:
+def error_table(summary: pd.DataFrame, suite: str, name: str | None = None) -> Table:
     """Errors over the whole trial by mass or case and variant, with survival, success, transport and kept objects.
 
-    labels: the paper's names of variants with another name here; without any variant of the paper, its columns are
-    omitted. name: of the table, default that of the suite.
+    Without any variant of the paper, its columns are omitted. name: of the table, default that of the suite.
     """
     chosen = summary[summary["suite"] == suite]
     kind = str(chosen["kind"].iloc[0])
-    known = any(labels.get(str(variant), str(variant)) in VARIANTS for variant in chosen["variant"])
-    beside = kind in NUMBERS and known and stepping_commanded(chosen)
+    beside = in_paper(chosen)
     entries = [*map(error_entry, ERROR_HEADS), *OUTCOME]
-    entries += [_paper_entry(summary, error, labels) for error in ERRORS] if beside else []
-    rows = with_paper(chosen, labels) if beside else chosen
+    entries += [_paper_entry(summary, error) for error in ERRORS] if beside else []
+    rows = with_paper(chosen) if beside else chosen
     return _by_mass_or_case(name or slug(suite), _caption(chosen, kind, beside), entries, rows)
 
 
@@ -63,11 +55,8 @@ def moving_table(summary: pd.DataFrame, suite: str) -> Table:
     return _by_mass_or_case(f"{slug(suite)}_moving", caption, entries, chosen)
 
 
-def paper_table(summary: pd.DataFrame, labels: Mapping[str, str] = NO_LABELS) -> Table | None:
-    """All cells of the paper's tables that were evaluated with walking: ours, the paper's and the ratio; None without.
-
-    labels: the paper's names of variants with another name here.
-    """
+def paper_table(summary: pd.DataFrame) -> Table | None:
+    """Cells of the paper's tables that were evaluated with walking: ours, the paper's and the ratio; None without."""
     entries = (
         Entry(Column("Mass"), lambda row: f"{row['mass']:g} kg", lambda rows: "any"),
         SURVIVED,
@@ -76,11 +65,11 @@ def paper_table(summary: pd.DataFrame, labels: Mapping[str, str] = NO_LABELS) ->
     rows: list[tuple[Cell, ...]] = []
     numbers: list[dict[str, object]] = []
     for suite in suites_of(summary, *NUMBERS):
-        chosen = with_paper(summary[summary["suite"] == suite], labels)
+        chosen = with_paper(summary[summary["suite"] == suite])
         if not stepping_commanded(chosen):
             continue
         kind, name = chosen["kind"].iloc[0], f"{NUMBERS[chosen['kind'].iloc[0]]}, {suite}"
-        known = chosen[chosen["variant"].map(lambda variant: labels.get(variant, variant)).isin(VARIANTS)]
+        known = chosen[chosen["name_in_paper"].isin(VARIANTS)]
         of_paper = known[known["mass"].isin(TABLES[kind])]
         of_paper = pd.concat([own for _, own in of_paper.groupby("variant", sort=False)] or [of_paper])
         found = variant_rows(entries, [(name, of_paper)])
@@ -110,11 +99,15 @@ def slug(suite: str) -> str:
     return suite.replace(" ", "_")
 
 
-def with_paper(rows: pd.DataFrame, labels: Mapping[str, str]) -> pd.DataFrame:
+def in_paper(rows: pd.DataFrame) -> bool:
+    """True if the paper has numbers for a variant in this suite's kind of trials, and ours walk as the paper's do."""
+    known = bool(rows["name_in_paper"].isin(VARIANTS).any())
+    return known and rows["kind"].iloc[0] in NUMBERS and stepping_commanded(rows)
+
+
+def with_paper(rows: pd.DataFrame) -> pd.DataFrame:
     """Rows with the paper's errors, `paper_<error>`, and the ratio of ours to them, `ratio_<error>`; NaN if missing."""
-    found = [
-        reported(row["kind"], row["mass"], labels.get(row["variant"], row["variant"])) for _, row in rows.iterrows()
-    ]
+    found = [reported(row["kind"], row["mass"], row["name_in_paper"]) for _, row in rows.iterrows()]
     paper = np.array([[np.nan] * len(ERRORS) if one is None or one == "absent" else one for one in found], np.float64)
     columns = {f"paper_{name}": paper[:, place] for place, name in enumerate(ERRORS)}
     ratios = {f"ratio_{name}": rows[name].to_numpy(np.float64) / columns[f"paper_{name}"] for name in ERRORS}
@@ -134,13 +127,13 @@ def _by_mass_or_case(name: str, caption: str, entries: list[Entry], chosen: pd.D
     return variant_table(name, caption, "Mass", entries, rows, chosen)
 
 
-def _paper_entry(summary: pd.DataFrame, error: str, labels: Mapping[str, str]) -> Entry:
+def _paper_entry(summary: pd.DataFrame, error: str) -> Entry:
     """The paper's error, in brackets the ratio of ours to it and the notes of `regime`."""
 
     def cell(row: pd.Series) -> str:
         value, ratio = row[f"paper_{error}"], row[f"ratio_{error}"]
         if np.isnan(value):
-            failed = reported(row["kind"], row["mass"], labels.get(row["variant"], row["variant"])) is None
+            failed = reported(row["kind"], row["mass"], row["name_in_paper"]) is None
             return FAILS if failed else ABSENT
         said = ([] if np.isnan(ratio) else [f"{ratio:.2f}"]) + regime(summary, row, error)
         return f"{value:.3f} ({'; '.join(said)})" if said else f"{value:.3f}"

@@ -14,11 +14,11 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from iowbc.arrays import Array
 from iowbc.evaluation.paper import TABLES, VARIANTS
-from iowbc.evaluation.report.aggregate import stepping_commanded, suites_of, variants_of
+from iowbc.evaluation.report.aggregate import suites_of, variants_of
 from iowbc.evaluation.report.capacity import Capacities, load_capacities, push_capacities
 from iowbc.evaluation.report.captions import conditions
 from iowbc.evaluation.report.columns import STANDS_STILL
-from iowbc.evaluation.report.error_tables import NUMBERS, SWEPT
+from iowbc.evaluation.report.error_tables import NUMBERS, SWEPT, in_paper
 from iowbc.evaluation.trials.errors import ERRORS, error_norm
 from iowbc.results.picture import COLOURS
 
@@ -67,7 +67,7 @@ def errors_against_mass(summary: pd.DataFrame, suite: str) -> Figure:
         _sweep_panel(axes, chosen, variants_of(summary), name, chosen[f"still_{name}"].mean(), itemgetter(place))
         axes.set(ylabel=LABELS[name], xlabel="" if place < 2 else f"{chosen['kind'].iloc[0]} mass [kg]")
     heading = f"Tracking errors against {chosen['kind'].iloc[0]} mass, bars: 95 % intervals. {conditions(chosen)}"
-    return finish(figure, [], f"{textwrap.fill(heading, TITLE_WIDTH)}\n{_note(_with_paper(chosen))}", panels[0])
+    return finish(figure, [], f"{textwrap.fill(heading, TITLE_WIDTH)}\n{_note(in_paper(chosen))}", panels[0])
 
 
 def comparison(summary: pd.DataFrame, capacity_rate: float) -> Figure:
@@ -93,7 +93,7 @@ def comparison(summary: pd.DataFrame, capacity_rate: float) -> Figure:
         _capacity_bars(panels[-2], capacities, carrying)
         panels[-2].set(title=f"load capacity at {100 * capacity_rate:.0f} % success", ylabel="mass [kg]")
     _success_panel(panels[-1], _heaviest(summary), "success rate")
-    known = any(_with_paper(summary[summary["suite"] == suite]) for suite in sweeps)
+    known = any(in_paper(summary[summary["suite"] == suite]) for suite in sweeps)
     return finish(figure, panels, _note(known) if sweeps else "", panels[0])
 
 
@@ -169,11 +169,6 @@ def _row(panel: float, widths: Sequence[float], layout: Any) -> tuple[Figure, li
     return figure, list(figure.subplots(1, len(widths), squeeze=False, width_ratios=widths).flat)
 
 
-def _with_paper(rows: pd.DataFrame) -> bool:
-    known = bool(rows["variant"].isin(VARIANTS).any())
-    return known and rows["kind"].iloc[0] in NUMBERS and stepping_commanded(rows)
-
-
 def _note(with_paper: bool) -> str:
     """The meaning of marks, grey lines and dotted ones."""
     marks = "means over the trials survived; at the upper edge: how many where not all survived, × none"
@@ -200,8 +195,9 @@ def _sweep_panel(
             axes.errorbar(rows["mass"] + shift, rows[column], yerr=half, capsize=3, label=variant, **style)
         else:
             axes.plot(rows["mass"], rows[column], label=variant, **style)
-        if _with_paper(chosen):
-            paper = {mass: row.get(variant) for mass, row in TABLES[chosen["kind"].iloc[0]].items()}
+        if in_paper(rows):
+            name, table = rows["name_in_paper"].iloc[0], TABLES[rows["kind"].iloc[0]]
+            paper = {mass: row.get(name) for mass, row in table.items()}
             points = {mass: of_paper(errors) for mass, errors in paper.items() if errors is not None}
             axes.plot(list(points), list(points.values()), linestyle=":", markerfacecolor="none", **style)
         _mark_survivors(axes, rows, place, style["color"], COUNT_WIDTH * float(np.ptp(chosen["mass"])))

@@ -1,7 +1,5 @@
 """Tables of success in the heavy tasks, joint torques at their limits, and ground contact."""
 
-from collections.abc import Mapping
-
 import numpy as np
 import pandas as pd
 
@@ -9,7 +7,6 @@ from iowbc.evaluation.paper import TYRE_SUCCESS
 from iowbc.evaluation.report.aggregate import TORQUE
 from iowbc.evaluation.report.captions import conditions
 from iowbc.evaluation.report.columns import SURVIVED, Entry, by_case, mean_entry, variant_rows, variant_table
-from iowbc.evaluation.report.error_tables import NO_LABELS
 from iowbc.results.table import ABSENT, Cell, Column, Table, heads
 
 TYRE_MASS = 18.0
@@ -19,11 +16,11 @@ JOINTS_SHOWN = 5
 """Number of joints in the torque table, those most often at their limit first; the CSV file has all."""
 
 
-def success_table(summary: pd.DataFrame, labels: Mapping[str, str] = NO_LABELS) -> Table:
+def success_table(summary: pd.DataFrame) -> Table:
     """Successful trials in the heavy tasks, with Wilson interval and the paper's rate."""
 
     def paper(row: pd.Series) -> str:
-        rate = TYRE_SUCCESS.get(labels.get(row["variant"], row["variant"])) if row["mass"] == TYRE_MASS else None
+        rate = TYRE_SUCCESS.get(row["name_in_paper"]) if row["mass"] == TYRE_MASS else None
         return ABSENT if rate is None else f"{100 * rate:.0f} %"
 
     entries = (

@@ -5,11 +5,18 @@ from pathlib import Path
 
 import pandas as pd
 
-from iowbc.evaluation.report.aggregate import TRAINING, aggregate, stepping_commanded, suites_of, with_trainings
+from iowbc.evaluation.report.aggregate import (
+    NO_LABELS,
+    TRAINING,
+    aggregate,
+    stepping_commanded,
+    suites_of,
+    with_trainings,
+)
 from iowbc.evaluation.report.capacity import capacity_table, push_table
 from iowbc.evaluation.report.compliance import compliance_figure, compliance_table, impedance_table
 from iowbc.evaluation.report.differences import difference_table
-from iowbc.evaluation.report.error_tables import NO_LABELS, SWEPT, error_table, moving_table, paper_table, slug
+from iowbc.evaluation.report.error_tables import SWEPT, error_table, moving_table, paper_table, slug
 from iowbc.evaluation.report.figures import comparison, errors_against_mass, robustness
 from iowbc.evaluation.report.interquartile import interquartile_table
 from iowbc.evaluation.report.other_tables import contact_table, heaviest, joint_table, success_table
@@ -28,8 +35,8 @@ def write_report(
     capacity_rate: success rate that a mass must reach to count as carried.
     labels: `eval.label` of each variant with another name here, to find the paper's numbers for it.
     """
-    tables, summary = folder / "tables", aggregate(trials)
-    for table in report_tables(trials, summary, capacity_rate, labels):
+    tables, summary = folder / "tables", aggregate(trials, labels)
+    for table in report_tables(trials, summary, capacity_rate):
         write_table(table, tables)
     pictures = {f"{slug(suite)}_errors": errors_against_mass(summary, suite) for suite in suites_of(summary, *SWEPT)}
     if suites_of(summary, *SWEPT, "heavy"):
@@ -46,20 +53,18 @@ def write_report(
     return summary
 
 
-def report_tables(
-    trials: pd.DataFrame, summary: pd.DataFrame, capacity_rate: float, labels: Mapping[str, str] = NO_LABELS
-) -> list[Table]:
+def report_tables(trials: pd.DataFrame, summary: pd.DataFrame, capacity_rate: float) -> list[Table]:
     """All tables that apply to the trials: walking only if it was commanded, joints only if a trial survived."""
     swept, kinds = suites_of(summary, *SWEPT), set(summary["kind"])
     walked = [suite for suite in swept if stepping_commanded(summary[summary["suite"] == suite])]
     several = len(with_trainings(trials)[["variant", TRAINING]].drop_duplicates()) > 1
     survived = not heaviest(summary).empty
     tables = [
-        *(error_table(summary, suite, labels) for suite in swept),
-        paper_table(summary, labels),
+        *(error_table(summary, suite) for suite in swept),
+        paper_table(summary),
         *(moving_table(summary, suite) for suite in walked),
         *(error_table(summary, suite) for suite in suites_of(summary, "stagnation", "robustness")),
-        success_table(summary, labels) if "heavy" in kinds else None,
+        success_table(summary) if "heavy" in kinds else None,
         error_table(summary, "heavy", name="heavy_errors") if "heavy" in kinds else None,
         capacity_table(summary, capacity_rate) if swept else None,
         push_table(summary, capacity_rate) if "pushes" in kinds else None,
