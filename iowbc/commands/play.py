@@ -36,6 +36,9 @@ def play(
             help="Recipe, RECIPE/STAGE, key, or export folder.", metavar="WHAT", autocompletion=completion.artifacts
         ),
     ],
+    stage: Annotated[
+        str | None, typer.Option(help="Stage whose policy is played (default: the last one available).")
+    ] = None,
     scene: options.SceneName = "lift",
     mass: Annotated[
         float | None,
@@ -76,7 +79,7 @@ def play(
     page = options.page_port(web, port)
     close_on_termination()
     plan = planned(store, word)
-    skill = skill_to_play(store, word, plan)
+    skill = skill_to_play(store, word, stage, plan)
     if skill is not None:
         if mass == 0.0 or disturbances:
             raise UsageError("a game has an object (--mass above 0) and no random --disturbances: its human disturbs")
@@ -97,10 +100,10 @@ def play(
     elif page is not None:
         from iowbc.live.session import Session
 
-        source, actor = _driven(store, console, word, plan)
+        source, actor = _driven(store, console, word, stage, plan)
         _serve(console, page, Session(source, request), evaluated=actor)
     else:
-        _play_episode(named_source(store, console, word, scene, plan), request, console)
+        _play_episode(named_source(store, console, word, stage, scene, plan), request, console)
 
 
 def _play_episode(source: "Source", request: PlayRequest, console: Console) -> None:
@@ -172,7 +175,7 @@ def _play_game(
         tell(console, f"{game.ending.replace('_', ' ')} after {game.seconds:.1f} s{made}")
 
 
-def _driven(store: Store, console: Console, word: str, plan: Run) -> "tuple[Source, Actor | None]":
+def _driven(store: Store, console: Console, word: str, stage: str | None, plan: Run) -> "tuple[Source, Actor | None]":
     """The policy to drive by hand, and the trials of its evaluation."""
     found: Mapping[str, Artifact] = {}
     if not os.path.isdir(word):
@@ -184,7 +187,7 @@ def _driven(store: Store, console: Console, word: str, plan: Run) -> "tuple[Sour
         require_whole(store.runs, [played])
         source = whole_source(store, played)
     else:
-        source = named_source(store, console, word, None, plan)
+        source = named_source(store, console, word, stage, None, plan)
     try:
         return source, None if evaluation is None else evaluated_actor(store, evaluation)
     except UsageError as error:

@@ -40,20 +40,19 @@ UNPLANNED = Run("", {})
 
 
 def planned(store: Store, word: str) -> Run:
-    """The recipe of a file, and the stored artifacts that its plan uses, of `FILE/STAGE` that one; `UNPLANNED` for any
-    other word. Raises `RecipeError` for a file that is wrong."""
-    file, stage = (Path(word).parent, Path(word).name) if Path(word).parent.suffix in SUFFIXES else (Path(word), None)
-    if file.suffix not in SUFFIXES or not os.path.isfile(file):
+    """The recipe of a file, and the stored artifacts that its plan uses; `UNPLANNED` for any other word. Raises
+    `RecipeError` for a file that is wrong."""
+    if Path(word).suffix not in SUFFIXES or not os.path.isfile(word):
         return UNPLANNED
-    loaded = load_recipe(file)
-    steps = [one for one in prepared(loaded, store.runs, Options()).plan() if stage in (None, one.stage.name)]
+    loaded = load_recipe(word)
+    steps = prepared(loaded, store.runs, Options()).plan()
     cached = {step.stage.name: step.artifact for step in steps if step.cached and step.artifact}
     return Run(word, cached, loaded.recipe.model_dump(mode="json"))
 
 
-def skill_to_play(store: Store, word: str, plan: Run = UNPLANNED) -> Artifact | None:
-    """The skill that a word names; None where it names no skill, or another stage."""
-    if os.path.isdir(word):
+def skill_to_play(store: Store, word: str, stage: str | None, plan: Run = UNPLANNED) -> Artifact | None:
+    """The skill that a word and `--stage` name; None where they name no skill, or another stage."""
+    if stage not in (None, SKILL) or os.path.isdir(word):
         return None
     if plan.recipe:
         return plan.artifacts.get(SKILL)
@@ -81,9 +80,11 @@ def playable_skill(store: Store, skill: Artifact, scene: str) -> "tuple[Specific
     return world, load_student(student.folder, world), robot, first[scene]
 
 
-def named_source(store: Store, console: Console, word: str, scene: str | None, plan: Run) -> "Source":
-    """The source that a word, with its plan, denotes; prints a line if it is still in training. Raises `UsageError`,
-    also for a `scene` that its recipe lacks.
+def named_source(
+    store: Store, console: Console, word: str, stage: str | None, scene: str | None, plan: Run
+) -> "Source":
+    """The source that a word, with its plan, and `--stage` denote; prints a line if it is still in training. Raises
+    `UsageError`, also for a `scene` that its recipe lacks.
 
     A recipe file denotes the artifacts that `iowbc plan` reports as cached. The section `eval` of that file, or of the
     recipe's last run for a name, sets how they are played.
@@ -92,12 +93,12 @@ def named_source(store: Store, console: Console, word: str, scene: str | None, p
 
     if os.path.isfile(Path(word, CONTRACT)):
         return exported_source(Path(word))
-    training, checkpoint = in_training(store, word)
+    training, checkpoint = in_training(store, word, stage)
     if checkpoint is not None:
         tell(console, training)
         return checkpoint
     try:
-        artifact = playable(store, word, plan)
+        artifact = playable(store, word, stage, plan)
     except UsageError:
         if not training:
             raise
@@ -117,12 +118,13 @@ def named_source(store: Store, console: Console, word: str, scene: str | None, p
     return source if asked is None else with_evaluation(source, asked)
 
 
-def in_training(store: Store, word: str) -> "tuple[str, Source | None]":
-    """Message about the newest unfinished training that `RECIPE/STAGE` names, empty without one; and its checkpoint, if
-    that can be played. Raises `UsageError` if its reference generator is gone."""
+def in_training(store: Store, word: str, stage: str | None) -> "tuple[str, Source | None]":
+    """Message about the newest unfinished training that `RECIPE/STAGE`, or a recipe and `--stage`, names, empty without
+    one; and its checkpoint, if that can be played. Raises `UsageError` if its reference generator is gone."""
     from iowbc.evaluation.play import Source
 
-    name, _, wanted = word.rpartition("/")
+    name, slash, last = word.rpartition("/")
+    name, wanted = (name, last) if slash and Path(word).suffix not in SUFFIXES else (word, stage)
     if wanted not in STAGES or not STAGES[wanted].trained_by:
         return "", None
     own = [one for one in unfinished(store.runs) if (one[1].stage, one[1].recipe) == (wanted, name_in(name))]
@@ -153,14 +155,16 @@ def whole_source(store: Store, artifact: Artifact) -> "Source":
     return Source(world.deployed if student else world, artifact.folder)
 
 
-def playable(store: Store, word: str, plan: Run = UNPLANNED) -> Artifact:
-    """The policy that a word names, before all one that its file plans to use. Raises `UsageError`."""
+def playable(store: Store, word: str, stage: str | None, plan: Run = UNPLANNED) -> Artifact:
+    """The policy that a word and `--stage` name, before all one that its file plans to use. Raises `UsageError`."""
     leave = any(name in plan.artifacts for name in policy_stages())
     found = plan.artifacts if leave else named(store, word).usable
     ready = [name for name in policy_stages() if name in found]
-    if not ready:
-        stages = f"stages that leave one: {', '.join(policy_stages())}; finished: {', '.join(found) or 'none'}"
-        raise UsageError(f"{word}: no policy to play; {stages}")
-    chosen = next((name for name in ready if found[name].whole), ready[0])
+    if not ready or (stage is not None and stage not in ready):
+        raise UsageError(
+            f"{word}: no policy {f'of stage {stage} ' if stage else ''}to play; "
+            f"stages that leave one: {', '.join(policy_stages())}; finished: {', '.join(found) or 'none'}"
+        )
+    chosen = stage or next((name for name in ready if found[name].whole), ready[0])
     require_results(store.runs, found[chosen])
     return found[chosen]

@@ -292,7 +292,7 @@ def test_what_is_damaged_is_neither_played_nor_compared_nor_reported(folder: Pat
         report(["second"], folder / "second.html", runs=folder / "runs")
     (folder / "runs" / "store" / "teacher" / key("second", "teacher") / "recipe.yaml").write_text("simulation: 3\n")
     with pytest.raises(UsageError, match=r"recipe\.yaml has 14 bytes.*to make it anew: iowbc run"):
-        named_source(store, console, "second/teacher", "lift", UNPLANNED)
+        named_source(store, console, "second/teacher", None, "lift", UNPLANNED)
 
 
 @pytest.mark.parametrize("stage", ["teacher", "rg-fit"])

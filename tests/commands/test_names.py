@@ -101,13 +101,13 @@ def test_a_run_that_has_begun_does_not_hide_what_is_published_until_it_has_its_o
     store = Store(Runs(folder / "runs"))
     shipped = open_artifact("first/export", folder / "runs")
     assert shipped.published
-    assert playable(store, "first") == shipped
-    assert playable(store, "first/export") == shipped
-    assert playable(store, "first/teacher").manifest.key == key("first", "teacher")
+    assert playable(store, "first", None) == shipped
+    assert playable(store, "first", "export") == shipped
+    assert playable(store, "first", "teacher").manifest.key == key("first", "teacher")
     assert [*named(store, "first").artifacts] == ["rg-dataset", "rg-fit", "teacher"], "those of this run alone"
     assert command("run", "first.yaml").returncode == 0
-    assert playable(store, "first").manifest.key == key("first", "export")
-    assert not playable(store, "first").published
+    assert playable(store, "first", None).manifest.key == key("first", "export")
+    assert not playable(store, "first", None).published
 
 
 def test_what_is_published_and_would_be_used_next_belongs_to_a_run_that_ended_early(

@@ -31,30 +31,30 @@ ROOT = Path(__file__).parents[2]
 
 def test_an_unfinished_training_is_told_and_played_from_its_checkpoint(folder: Path) -> None:
     store = Store(Runs(folder / "runs"))
-    assert in_training(store, "first/teacher") == ("", None)
+    assert in_training(store, "first/teacher", None) == ("", None)
     workspace = Workspace(store.runs, "teacher", "f" * 64)
     workspace.begin("first", False, {})
     workspace.progress(42, 100, "")
     workspace.write()
-    assert in_training(store, "first/teacher") == ("teacher of first was interrupted, 42 % done", None)
+    assert in_training(store, "first/teacher", None) == ("teacher of first was interrupted, 42 % done", None)
     checkpoint = workspace.scratch / "training.checkpoint"
     checkpoint.write_bytes(b"")
     os.utime(checkpoint, 2 * (time.time() - 3600,))
     describe(workspace.root, {"inputs": {}}, "name: first\n")
-    told, playable = in_training(store, "first/teacher")
+    told, playable = in_training(store, "first", "teacher")
     assert playable is not None
     assert (playable.world.recipe, playable.policy, playable.key) == (Recipe(name="first"), checkpoint, "f" * 64)
     assert told.startswith("teacher of first was interrupted, 42 % done; this is its checkpoint of 60 min ago")
-    assert in_training(store, "first") == ("", None)
-    assert in_training(store, "second/teacher") == ("", None)
-    assert in_training(store, "first/distill") == ("", None)
+    assert in_training(store, "first", None) == ("", None)
+    assert in_training(store, "second/teacher", None) == ("", None)
+    assert in_training(store, "first/distill", None) == ("", None)
 
 
 def test_a_training_without_a_checkpoint_yet_is_told_in_one_sentence(folder: Path) -> None:
     store, console = Store(Runs(folder / "runs")), Console(file=io.StringIO())
     Workspace(store.runs, "teacher", "f" * 64).begin("third", False, {})
     with pytest.raises(UsageError, match=r"^teacher of third was interrupted; there is neither a checkpoint that can"):
-        named_source(store, console, "third/teacher", None, UNPLANNED)
+        named_source(store, console, "third/teacher", None, None, UNPLANNED)
     assert not console.file.getvalue()  # type: ignore[attr-defined]
 
 
@@ -126,11 +126,10 @@ def test_a_recipe_that_plans_cached_is_played_by_its_own_sequence_and_film_setti
     )
     store, console = Store(Runs(tmp_path / "runs")), Console(file=io.StringIO())
     plan = planned(store, str(own))
-    source = named_source(store, console, str(own), "wide_box", plan)
+    source = named_source(store, console, str(own), None, "wide_box", plan)
     assert source.policy.parent.name == "distill"
-    assert [*planned(store, f"{own}/teacher").artifacts] == ["teacher"]
     assert requested_episode(source.world.recipe, PlayRequest()).duration == 5.0
     assert requested_episode(source.world.recipe, PlayRequest(scene="wide_box")).scene == "wide_box"
     assert source.world.recipe.eval.video.width == 96
     with pytest.raises(UsageError, match="did you mean 'wide_box'"):
-        named_source(store, console, str(own), "wide_bx", plan)
+        named_source(store, console, str(own), None, "wide_bx", plan)

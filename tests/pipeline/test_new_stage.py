@@ -84,12 +84,12 @@ def test_it_runs_behind_what_it_reads_and_tells_its_figures(run: Run) -> None:
 def test_its_policy_is_the_one_to_play(run: Run, workplace: Workplace) -> None:
     assert policy_stages()[0] == "juggle"
     assert next_commands(workplace.store.runs, "small", run.artifacts)[0].startswith("iowbc play ")
-    assert playable(workplace.store, run.artifacts["juggle"].manifest.key).manifest.stage == "juggle"
+    assert playable(workplace.store, run.artifacts["juggle"].manifest.key, None).manifest.stage == "juggle"
 
 
 def test_its_training_is_found_while_it_goes_on(run: Run, workplace: Workplace) -> None:
     Workspace(workplace.store.runs, "juggle", "f" * 64).begin("small", False, {})
-    assert in_training(workplace.store, "small/juggle") == ("juggle of small was interrupted", None)
+    assert in_training(workplace.store, "small/juggle", None) == ("juggle of small was interrupted", None)
 
 
 def test_its_curves_and_steps_are_compared(run: Run) -> None:

@@ -91,7 +91,7 @@ def test_a_fresh_clone_has_a_controller_to_try(tmp_path: Path, monkeypatch: pyte
     monkeypatch.setenv("IOWBC_RUNS", str(tmp_path / "runs"))
     controller = Controller.load("quickstart")
     assert controller.robot.name == "g1"
-    played = playable(Store(Runs(tmp_path / "runs")), "quickstart")
+    played = playable(Store(Runs(tmp_path / "runs")), "quickstart", None)
     assert (played.manifest.stage, played.manifest.recipe, played.published) == ("export", "quickstart", True)
     assert sum(path.stat().st_size for path in played.folder.rglob("*") if path.is_file()) < 1.5e6
     folders = list((ROOT / "runs" / "published" / "export").iterdir())
@@ -102,21 +102,22 @@ def test_a_fresh_clone_has_a_controller_to_try(tmp_path: Path, monkeypatch: pyte
 def test_what_was_published_without_weights_is_played_from_an_earlier_stage_or_refused(tmp_path: Path) -> None:
     (tmp_path / "published").symlink_to(ROOT / "runs" / "published")
     store = Store(Runs(tmp_path))
-    assert playable(store, "full_seed_1").manifest.stage == "distill"
+    assert playable(store, "full_seed_1", None).manifest.stage == "distill"
     with pytest.raises(UsageError, match=r"without settle.onnx, step.onnx; to make it anew: .* --force export"):
-        playable(store, "full_seed_1/export")
+        playable(store, "full_seed_1", "export")
     with pytest.raises(UsageError, match=r"teacher of compliant_pace came .* without teacher.safetensors"):
-        playable(store, "compliant_pace")
+        playable(store, "compliant_pace", None)
 
 
 def test_a_fresh_clone_has_a_skill_whose_partner_one_can_be(tmp_path: Path) -> None:
     (tmp_path / "runs").mkdir()
     (tmp_path / "runs" / "published").symlink_to(ROOT / "runs" / "published")
     store = Store(Runs(tmp_path / "runs"))
-    found = [skill_to_play(store, word) for word in ("transport", "transport/skill")]
+    asked = [("transport", None), ("transport/skill", None), ("transport", "skill")]
+    found = [skill_to_play(store, *one) for one in asked]
     assert all(one is not None and (one.manifest.stage, one.manifest.recipe) == ("skill", "transport") for one in found)
-    for other in ("transport/teacher", "full", "nothing"):
-        assert skill_to_play(store, other) is None
+    for other in (("transport", "teacher"), ("full", None), ("nothing", None)):
+        assert skill_to_play(store, *other) is None
 
 
 def test_a_published_game_is_not_played_without_an_object(tmp_path: Path) -> None:
