@@ -31,42 +31,38 @@ def main(recipe: Recipe, *, scene: str = "lift", turns: int = 6, others: int | N
 
     Both trainings alternate, with equally many samples, epochs and minibatches per update and networks of one size.
     Rates are of the best repetition, which other programs disturbed least; the ratio is a median over repetitions.
-    `others`: processes of stable-baselines3, each with one environment; by default one a core. 0 leaves it out.
+    `others`: processes of stable-baselines3, each with one environment; by default one a core.
     """
     cores = available_cores()
     with benchmark_world(recipe, scene) as specification:
         recipe, settings = specification.recipe, specification.recipe.teacher
-        samples, count = settings.environments * settings.rollout, cores if others is None else others
+        samples, count = settings.environments * settings.rollout, others or cores
         print(f"{recipe.name}: scene {scene}, networks {list(settings.hidden)}, {settings.environments} environments")
         environments = VectorEnv(specification, num_envs=settings.environments, workers=cores, seed=recipe.seed)
         mirrors = environments.layout.mirror, action_mirror(load_robot(specification.robot))
-        other = _plain(specification, scene, count, samples) if count else None
+        other = _plain(specification, scene, count, samples)
         try:
             prepare_process()
             training = TeacherTraining(settings, environments, mirrors, recipe.seed, cores=cores)
             rows, rates, other_rates = [], [], []
-            for turn in range(turns + 1):  # the first warms up
+            for _ in range(turns + 1):
                 begin = time.perf_counter()
                 figures = training.update()
-                rate = samples / (time.perf_counter() - begin)
-                other_rate = _other_rate(other) if other is not None else np.nan
-                if turn:
-                    rates.append(rate)
-                    other_rates.append(other_rate)
-                    rows.append([figures[f"seconds/{part}"] for part in PARTS])
+                rates.append(samples / (time.perf_counter() - begin))
+                other_rates.append(_other_rate(other))
+                rows.append([figures[f"seconds/{part}"] for part in PARTS])
+            del rows[0], rates[0], other_rates[0]  # the first update warms up
         finally:
             environments.close()
-            if other is not None:
-                other.env.close()
+            other.env.close()
     best = int(np.argmax(rates))
     found = {"train": rates[best]} | {f"seconds_{part}": rows[best][place] for place, part in enumerate(PARTS)}
     print(f"{'this training':34}{rates[best]:10.0f} steps/s")
     for part, seconds in zip(PARTS, rows[best], strict=True):
         print(f"  {part:32}{1e3 * seconds:10.0f} ms an update {100 * seconds / sum(rows[best]):6.1f} %")
-    if other is not None:
-        found |= {"sb3": max(other_rates), "ratio": float(np.median(np.divide(rates, other_rates)))}
-        print(f"{f'SB3 PPO, SubprocVecEnv of {count}':34}{found['sb3']:10.0f} steps/s")
-        print(f"this training is {found['ratio']:.1f} times as fast")
+    found |= {"sb3": max(other_rates), "ratio": float(np.median(np.divide(rates, other_rates)))}
+    print(f"{f'SB3 PPO, SubprocVecEnv of {count}':34}{found['sb3']:10.0f} steps/s")
+    print(f"this training is {found['ratio']:.1f} times as fast")
     return found
 
 

@@ -37,17 +37,13 @@ def train(
     recipe: BenchRecipe = None,
     scene: options.SceneName = "lift",
     turns: Annotated[int, typer.Option(help="Number of updates.", min=1)] = 6,
-    others: Annotated[
-        int | None,
-        typer.Option(help="Processes of plain stable-baselines3 (default: one per core; 0 skips it).", min=0),
-    ] = None,
     runs: options.RunsFolder = options.RUNS,
 ) -> None:
     """Measure the teacher's training. Raises `UsageError`."""
     own = _checked(runs, recipe, scene)
     from iowbc.benchmarks import training
 
-    record_figures(Runs(runs), "bench-train", training.main(own, scene=scene, turns=turns, others=others))
+    record_figures(Runs(runs), "bench-train", training.main(own, scene=scene, turns=turns))
 
 
 def control(

@@ -64,9 +64,6 @@ Overrides = Annotated[
         "--set", help="Override a recipe value (repeatable).", metavar="A.B.C=VALUE", autocompletion=completion.paths
     ),
 ]
-SweepFile = Annotated[
-    Path | None, typer.Option("--from", help="YAML file of a sweep: grid, random draws, or both.", metavar="YAML")
-]
 Until = Annotated[
     str | None, typer.Option(help="Stop after this stage.", metavar="STAGE", autocompletion=completion.stages)
 ]
@@ -83,7 +80,6 @@ Engine = Annotated[
 Address = Annotated[
     str | None, typer.Option(help="Ray cluster: local, auto, HOST:PORT, ray://HOST:PORT.", metavar="ADDRESS")
 ]
-DryRun = Annotated[bool, typer.Option("--dry-run", help="Show the plan without running it.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]
 OnCodeChange = Annotated[
     Literal["report", "rerun"], typer.Option(help="Policy for cached stages whose code has changed.")

@@ -1,26 +1,24 @@
-"""`iowbc plan`: stages that would run, the reasons, and the time, for a recipe, a study or a sweep."""
+"""`iowbc plan`: stages that would run, the reasons, and the time, for a recipe or a study."""
 
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-import typer
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
 from iowbc.commands import options
 from iowbc.commands.printed import hanging, plain_table, print_json, shown_path, stdout_console, tell
-from iowbc.commands.request import Request, in_order, planners, point_planners
+from iowbc.commands.request import Request, in_order, planners
 from iowbc.pipeline.console.wording import KEY_LENGTH, duration, short
 from iowbc.pipeline.planner import Planner
 from iowbc.pipeline.stage import Stage
 from iowbc.pipeline.stage_plan import Options, StagePlan
 from iowbc.pipeline.store.digests import data_digest
 from iowbc.pipeline.store.runs import Runs
-from iowbc.recipe.sweep import MOST_POINTS
 
 REASONS_SHOWN = 8
 """Reasons of a stage that are printed; the rest is counted."""
@@ -38,21 +36,12 @@ def plan(
     until: options.Until = None,
     force: options.Force = None,
     on_code_change: options.OnCodeChange = "report",
-    as_sweep: Annotated[bool, typer.Option("--sweep", help="Plan a sweep: `--set` accepts several values.")] = False,
-    file: options.SweepFile = None,
     as_json: options.AsJson = False,
     runs: options.RunsFolder = options.RUNS,
 ) -> None:
+    """Print the stages that would run, and why; for several recipes, as of a study, a table."""
     asked = Options(until, frozenset(force or ()), on_code_change=on_code_change)
     request, console = Request(recipe, overrides or (), Runs(runs), asked), stdout_console()
-    if as_sweep or file is not None:
-        plan_sweep(request, file, console, as_json)
-    else:
-        print_plan(request, console, as_json)
-
-
-def print_plan(request: Request, console: Console, as_json: bool = False) -> None:
-    """Print the stages that would run, and why; for several recipes, as of a study, a table."""
     each = [one for planner in planners(request) for one in in_order(planner)]
     longest: dict[tuple[Path, tuple[str, ...]], Planner] = {}
     for one in each:  # a recipe may be both requested and an origin of another one
@@ -67,27 +56,6 @@ def print_plan(request: Request, console: Console, as_json: bool = False) -> Non
         _print(found[0].plan(), console)
     else:
         _print_several(request, found, console)
-
-
-def plan_sweep(
-    asked: Request, file: Path | None, console: Console, as_json: bool = False, most: int = MOST_POINTS
-) -> None:
-    """Print the plan of each point of a sweep in a row, and the total. Raises `RecipeError`."""
-    sweep, of_points = point_planners(asked, file, most)
-    found = planned(of_points)
-    if as_json:
-        data = [
-            {
-                "point": point.name,
-                "settings": dict(point.settings),
-                "stages": [step_data(step) | {"shared_with": step.shared_with or None} for step in found[point.name]],
-            }
-            for point in sweep.points
-        ]
-        print_json(console, {"sweep": sweep.name, "points": data})
-    else:
-        console.print(plan_table(found, "point"))
-        console.print(in_all(found), highlight=False)
 
 
 def planned(planners: Sequence[Planner]) -> Planned:

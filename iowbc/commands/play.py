@@ -88,11 +88,12 @@ def play(
             return
         if partner is not None:
             raise UsageError("--web and --partner exclude each other: on the page you are the human")
-        from iowbc.live.game import GamePanel, GameRequest, GameSession
+        from iowbc.live.game import GamePanel, GameSession
+        from iowbc.skill.plan import PERSON, Plan
 
         world, student, robot, task = playable_skill(store, skill, scene)
         tell(console, f"skill of {skill.manifest.recipe}: you are its partner")
-        first = GameRequest(task, seed, mass=mass, share=partner_share)
+        first = Plan(task, PERSON, known=False, mass=mass, share=partner_share, seed=seed)
         _serve(console, page, GameSession(world, student, robot, first), panel=GamePanel)
     elif partner is not None:
         raise UsageError(f"{word}: --partner is the human of a skill's game, and this names no skill")

@@ -17,7 +17,7 @@ from iowbc.deploy.exported_folder import exported_folder
 from iowbc.errors import UsageError, require_known
 from iowbc.onboard.checks import CHECKS, LIMITS, CheckResult, checks
 from iowbc.onboard.machine import Machine
-from iowbc.onboard.operators import Keyboard, OperatorWithPoses, Udp, object_poses, operator, pose_port, single_keys
+from iowbc.onboard.operators import Keyboard, OperatorWithPoses, Udp, operator, single_keys, udp_port
 from iowbc.onboard.ranges import Ranges
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ def robot(
     controller = Controller.load(exported_folder(what))
     require_known(scene, "scene", [name for name, _ in controller.contract.references.grasps])
     source = operator(commands, controller.contract)
-    poses = None if object_pose is None else object_poses(object_pose, controller.contract)
+    poses = None if object_pose is None else Udp(Ranges(controller.contract), udp_port(object_pose, "--object-pose"))
     stop = _stop_request()
     bus = DdsBus(network, domain)
     with ExitStack() as stack:
@@ -168,7 +168,7 @@ def robot_sim(
     from iowbc.twin.support import Support
 
     console = stdout_console()
-    tracking = None if object_pose is None else ObjectTracking(pose_port(object_pose))
+    tracking = None if object_pose is None else ObjectTracking(udp_port(object_pose, "--object-pose"))
     folder = exported_folder(what)
     world, controller = exported_world(folder), Controller.load(folder)
     simulation = world.recipe.simulation

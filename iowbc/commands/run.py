@@ -11,7 +11,6 @@ from rich.console import Console
 
 from iowbc.commands import options
 from iowbc.commands.compare import film_joint, write_comparison
-from iowbc.commands.plan import print_plan
 from iowbc.commands.printed import stdout_console, tell
 from iowbc.commands.process import DONE, INTERRUPTED, STAGE_FAILED, RunEnding, ignoring_broken_outputs
 from iowbc.commands.request import Request, in_order, planners
@@ -45,18 +44,14 @@ def run(
     workers: options.Workers = None,
     engine: options.Engine = None,
     address: options.Address = None,
-    dry_run: options.DryRun = False,
     on_code_change: options.OnCodeChange = "report",
     quiet: options.Quiet = False,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Print one line per progress step.")] = False,
     runs: options.RunsFolder = options.RUNS,
 ) -> None:
-    """Run a recipe or a study, or print its plan; exits with the code of the run."""
+    """Run a recipe or a study; exits with the code of the run."""
     asked = Options(until, frozenset(force or ()), workers, engine, address, on_code_change)
     request = Request(recipe, overrides or (), Runs(runs), asked)
-    if dry_run:
-        print_plan(request, stdout_console())
-        return
     manner: Manner = "quiet" if quiet else "verbose" if verbose else "usual"
     with ignoring_broken_outputs():
         raise typer.Exit(run_request(request, stdout_console(), manner))

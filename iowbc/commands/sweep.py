@@ -13,7 +13,7 @@ from rich.console import Console
 
 from iowbc.commands import completion, options
 from iowbc.commands.lookup import SWEEP_TABLE, named, record_sweep
-from iowbc.commands.plan import in_all, plan_sweep, planned
+from iowbc.commands.plan import in_all, plan_table, planned
 from iowbc.commands.points import Endings, PointProcess, PointRun, PointThread, run_points
 from iowbc.commands.printed import shown_path, stdout_console, tell
 from iowbc.commands.process import DONE, INTERRUPTED, STAGE_FAILED, RunEnding, ignoring_broken_outputs
@@ -49,7 +49,9 @@ def sweep(
             autocompletion=completion.paths,
         ),
     ] = None,
-    file: options.SweepFile = None,
+    file: Annotated[
+        Path | None, typer.Option("--from", help="YAML file of a sweep: grid, random draws, or both.", metavar="YAML")
+    ] = None,
     jobs: Annotated[
         int | None,
         typer.Option(help="Points run in parallel on shared cores (default: 1; with Ray: all cores).", min=1),
@@ -59,7 +61,7 @@ def sweep(
     workers: Annotated[int | None, typer.Option(help="Worker processes per point.", min=1)] = None,
     engine: options.Engine = None,
     address: options.Address = None,
-    dry_run: options.DryRun = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Show the plan without running it.")] = False,
     on_code_change: options.OnCodeChange = "report",
     quiet: options.Quiet = False,
     runs: options.RunsFolder = options.RUNS,
@@ -70,11 +72,14 @@ def sweep(
     further += ["--jobs", str(jobs)] if jobs else []
     further += ["--points", str(points)] if points != MOST_POINTS else []
     request = Request(recipe, overrides or (), Runs(runs), settings, "sweep", further)
+    console = stdout_console()
     if dry_run:
-        plan_sweep(request, file, stdout_console(), most=points)
+        found = planned(point_planners(request, file, points)[1])
+        console.print(plan_table(found, "point"))
+        console.print(in_all(found), highlight=False)
         return
     with ignoring_broken_outputs():
-        raise typer.Exit(run_sweep(request, file, jobs, points, stdout_console(), quiet))
+        raise typer.Exit(run_sweep(request, file, jobs, points, console, quiet))
 
 
 def _require_origins(asked: Request, planners: Sequence[Planner]) -> None:

@@ -1,7 +1,7 @@
 """A game of the skill layer whose human is a person: the mouse leads a spring and damper at the object's far handle."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import viser
@@ -17,7 +17,7 @@ from iowbc.robot import rotations
 from iowbc.sim.rendering.forces import Force
 from iowbc.skill.game import NOMINAL
 from iowbc.skill.lower_layer import Student
-from iowbc.skill.plan import PERSON, Plan, Rule
+from iowbc.skill.plan import Plan, Rule
 from iowbc.skill.single_game import SingleGame
 from iowbc.task.specification import Specification
 
@@ -27,27 +27,13 @@ ROBOTS: dict[str, Rule | None] = {"skill": None, "admittance follower": "follow"
 """Robots that a person can compare: the trained skill, and the rule of one without."""
 
 
-@dataclass(frozen=True)
-class GameRequest:
-    """One game."""
-
-    task: str
-    seed: int = 0
-    robot: str = "skill"
-    """One of `ROBOTS`."""
-    mass: float | None = None
-    """Mass of the object [kg]; drawn if empty."""
-    share: float | None = None
-    """Share of the weight that the person bears; drawn if empty."""
-
-
 class GameSession(Played):
-    """One game after another; the robot does not know the path."""
+    """One game after another, with a person as the human."""
 
     view = ((2.2, -1.7, 1.5), (0.4, 0.0, 0.6))
 
-    def __init__(self, world: Specification, student: Student, skill: TeacherNetwork, request: GameRequest) -> None:
-        """`skill`: the robot's policy. Raises UsageError for an unknown task."""
+    def __init__(self, world: Specification, student: Student, skill: TeacherNetwork, request: Plan) -> None:
+        """`skill`: the robot's policy in games without a rule of `ROBOTS`. Raises UsageError for an unknown task."""
         recipe = world.recipe
         tasks = recipe.skill.tasks
         slow = {name: getattr(tasks, name).model_copy(update={"duration": TIME_LIMIT}) for name in tasks.names}
@@ -57,12 +43,9 @@ class GameSession(Played):
         self._grip: tuple[Array, bool] | None = None
         self._open(request)
 
-    def _open(self, request: GameRequest) -> None:
-        rule = ROBOTS[request.robot]
-        mass, share = request.mass, request.share
-        plan = Plan(request.task, PERSON, known=False, mass=mass, share=share, seed=request.seed, rule=rule)
-        networks = NOMINAL | {"robot": self._skill if rule is None else None}
-        self.request, self._game = request, SingleGame(self.world, self._student, networks, plan)
+    def _open(self, request: Plan) -> None:
+        networks = NOMINAL | {"robot": self._skill if request.rule is None else None}
+        self.request, self._game = request, SingleGame(self.world, self._student, networks, request)
         self._lower = self._game.lower
         self.robot, self.period = self._lower.robot, self._lower.period
         self._signals = {name: np.zeros((1, 1)) for name in ("covered", "length", "lateral", "share")}
@@ -127,6 +110,7 @@ class GamePanel(ControlPanel):
 
     def _add_tabs(self, tabs: viser.GuiTabGroupHandle) -> None:
         request, gui = self._session.request, self._gui
+        robot = next(name for name, rule in ROBOTS.items() if rule == request.rule)
         self._names = self._session.world.recipe.skill.tasks.names
         with tabs.add_tab("Game"):
             gui.add_markdown(
@@ -135,12 +119,13 @@ class GamePanel(ControlPanel):
             )
             self.task = gui.add_dropdown("Task", self._names, initial_value=request.task)
             self._button(gui.add_button("Next task"), "next task")
-            self.rival = gui.add_dropdown("Robot", tuple(ROBOTS), initial_value=request.robot)
+            self.rival = gui.add_dropdown("Robot", tuple(ROBOTS), initial_value=robot)
             self.seed = gui.add_number("Seed", request.seed, min=0, max=LAST_SEED, step=1, hint="Of load and spring")
 
     @property
-    def conditions(self) -> GameRequest:
-        return replace(self._session.request, task=self.task.value, seed=int(self.seed.value), robot=self.rival.value)
+    def conditions(self) -> Plan:
+        rule = ROBOTS[self.rival.value]
+        return replace(self._session.request, task=self.task.value, seed=int(self.seed.value), rule=rule)
 
     def press(self, button: Button) -> None:
         if button == "next task":

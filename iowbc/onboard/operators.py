@@ -248,21 +248,12 @@ def operator(kind: str, contract: Contract) -> Remote | Keyboard | Udp:
         return Remote(ranges)
     if kind == "keyboard":
         return Keyboard(ranges)
-    return Udp(ranges, _port(kind, f"--commands {kind}: valid: remote, keyboard, udp:PORT"))
+    return Udp(ranges, udp_port(kind, "--commands", "remote, keyboard, udp:PORT"))
 
 
-def object_poses(kind: str, contract: Contract) -> Udp:
-    """The source of the object's pose that `--object-pose` names. Raises UsageError."""
-    return Udp(Ranges(contract), pose_port(kind))
-
-
-def pose_port(kind: str) -> int:
-    """The port that `--object-pose` names. Raises UsageError."""
-    return _port(kind, f"--object-pose {kind}: valid: udp:PORT")
-
-
-def _port(kind: str, refusal: str) -> int:
+def udp_port(kind: str, option: str, valid: str = "udp:PORT") -> int:
+    """The port that the value `kind` of an option names. Raises UsageError with the valid values."""
     name, _, port = kind.partition(":")
     if name == "udp" and port.isdecimal() and int(port) < 65536:
         return int(port)
-    raise UsageError(refusal)
+    raise UsageError(f"{option} {kind}: valid: {valid}")

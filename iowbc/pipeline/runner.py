@@ -38,9 +38,9 @@ class StageReport:
         """Record named values at a step; the first name is the stage's main metric."""
         if not values:
             return
-        name = self.view.metric if self.view.metric in values else next(iter(values))
+        main = self.view.record.metric
+        name = main if main in values else next(iter(values))
         self.view.measured(name, step, float(values[name]))
-        self.workspace.state.metric = self.view.metric
         if self.tracker is not None:
             self.tracker.metrics(self.view.name, values, step)
         self.display.moved(self.view)
@@ -171,9 +171,7 @@ class Runner:
         forced = stage.name in self.options.force
         earlier = workspace.begin(self.loaded.recipe.name, forced, dict(step.code), self.command())
         describe(workspace.root, ingredients, resolved)
-        view.metric, view.curve = workspace.state.metric, workspace.state.curve
-        view.done, view.total = workspace.state.done, workspace.state.total
-        view.began = time.monotonic() - workspace.seconds
+        view.record, view.began = workspace.state, time.monotonic() - workspace.seconds
         self._show(stage, "runs", short(step.notes or step.reasons, 1))
         view.note = ""
         changed = changed_code(earlier.code, step.code) if earlier else []

@@ -29,7 +29,7 @@ FOLLOWER_FADE_SPEED = 0.03
 PATH, FOLLOWER, LEADER, STOPPING, TUGGING, LAGGING = range(len(BEHAVIOURS))
 STATE_FIELDS = (
     *("stiffness", "damping", "weight", "resistance", "bound", "pace", "gust", "drift", "share", "wandering"),
-    *("present", "height", "heading", "offset", "aim", "unsteady", "centre", "at", "speed", "arm", "force", "energy"),
+    *("present", "height", "heading", "offset", "aim", "unsteady", "centre", "at", "speed", "arm", "force"),
     *("behaviour", "steps", "turning", "sideways", "rise", "stop", "halted", "followed", "attention", "slow"),
 )
 
@@ -67,7 +67,7 @@ class Partner:
         self._heading, self._offset = np.zeros((n, 2)), np.zeros((n, 2))
         self._aim, self._unsteady, self._centre = np.zeros((n, 3)), np.zeros((n, 2)), self._places[:, 1]
         self._at, self._speed, self._arm = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3))
-        self._force, self._energy = np.zeros((n, 3)), np.zeros(n)
+        self._force = np.zeros((n, 3))
         self.handle_displacement = np.zeros((n, 3))
         """Displacements of the handles in the last period, (n, 3) [m]; zero without an object. Not in snapshots."""
         self._behaviour, self._steps, self._attention = np.zeros(n), np.zeros(n, np.int64), np.ones(n)
@@ -109,7 +109,7 @@ class Partner:
         self._drift[which] = present * drawn["partner_share_drift"][which] * np.sqrt(1.0 - self._keep_share**2)
         self._centre[which] = drawn["object_com_offset"][which]
         self._line.fill(which, np.zeros((len(which), FEED)))
-        for values in (self._unsteady, self._wandering, self._energy, self._force, self._followed, self._steps):
+        for values in (self._unsteady, self._wandering, self._force, self._followed, self._steps):
             values[which] = 0
         self._height[which] = np.nan
         self._observe(state)
@@ -285,17 +285,14 @@ class Partner:
         self._heading[:, 1] = sine * x + cosine * y
 
     def observe(self, state: SimulationState) -> None:
-        """Follows the handle over a period, and adds up the work done on it."""
+        """Follows the handle over a period."""
         if not self._things:
             return
         before = self._at
         self._observe(state)
-        way = self.handle_displacement = self._at - before
-        if not self._any:
-            return
-        self._energy += self._force[:, 0] * way[:, 0] + self._force[:, 1] * way[:, 1] + self._force[:, 2] * way[:, 2]
-        state.partner_force[:] = self._force
-        state.partner_energy[:] = self._energy
+        self.handle_displacement = self._at - before
+        if self._any:
+            state.partner_force[:] = self._force
 
     def _observe(self, state: SimulationState) -> None:
         places = rotations.rotate(state.object_quaternion[:, None], self._places)

@@ -24,7 +24,7 @@ from iowbc.sim.timing import Timing
 from iowbc.sim.world import World, make_world
 
 STARTS_AT_ZERO = (
-    *("joint_acceleration", "slipped", "partner_force", "partner_velocity", "partner_energy", "partner_share"),
+    *("joint_acceleration", "slipped", "partner_force", "partner_velocity", "partner_share"),
     *("external_force", "push_force"),
 )
 """Fields of the state that are zero at the start of an episode."""

@@ -104,8 +104,6 @@ class SimulationState:
         """Velocity of the object's far handle, which a partner holds, (n, 3) [m/s]; zero without an object."""
         self.partner_share = np.zeros(n)
         """Share of the weight, or in a push of the rolling resistance, that the partner bears at the time, (n,)."""
-        self.partner_energy = np.zeros(n)
-        """Work of the partner on the object since the reset, (n,) [J]."""
         self.external_force = np.zeros((n, 6))
         """Force and torque of partner and impulses on the object about its centre of mass, (n, 6) [N, N·m]."""
         self.push_force = np.zeros((n, 3))

@@ -92,9 +92,9 @@ def test_a_finished_recipe_is_cached_and_fast(folder: Path, command: Command) ->
     assert "all stages are cached" in command("plan", "first.yaml").stdout
 
 
-def test_a_dry_run_is_a_plan(folder: Path, command: Command) -> None:
+def test_a_plan_gives_the_reasons_and_writes_nothing(folder: Path, command: Command) -> None:
     before = sorted(folder.rglob("*"))
-    done = command("run", "first.yaml", "--dry-run", "--set", "eval.trials=9")
+    done = command("plan", "first.yaml", "--set", "eval.trials=9")
     assert done.returncode == 0
     assert "eval.trials (--set eval.trials=9): 5 -> 9" in " ".join(done.stdout.split())
     assert "1 stage would run" in done.stdout

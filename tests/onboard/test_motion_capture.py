@@ -13,7 +13,8 @@ import pytest
 
 from iowbc.arrays import Array
 from iowbc.deploy.contract import read_contract
-from iowbc.onboard.operators import object_poses
+from iowbc.onboard.operators import Udp
+from iowbc.onboard.ranges import Ranges
 from iowbc.robot import rotations
 
 SEEN = runpy.run_path(str(Path(__file__).parents[2] / "examples" / "motion_capture.py"))["seen"]
@@ -70,7 +71,7 @@ def test_nothing_is_sent_of_a_lost_object_and_no_velocity_reaches_over_the_gap()
 
 def test_the_robots_program_understands_the_message(sighted: Path) -> None:
     message = next(SEEN(Cameras(), "pelvis", "crate"))
-    poses = object_poses("udp:0", read_contract(sighted))
+    poses = Udp(Ranges(read_contract(sighted)), 0)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         sender.sendto(json.dumps(message).encode(), ("127.0.0.1", poses.port))
     wanted = poses.wanted(1.0, None)

@@ -26,8 +26,8 @@ from iowbc.onboard.operators import (
     OperatorWithPoses,
     Remote,
     Udp,
-    object_poses,
     operator,
+    udp_port,
 )
 from iowbc.onboard.ranges import Ranges
 
@@ -224,4 +224,4 @@ def test_an_unknown_source_is_refused(blind: Path, kind: str) -> None:
     with pytest.raises(UsageError, match="valid: remote, keyboard, udp:PORT"):
         operator(kind, read_contract(blind))
     with pytest.raises(UsageError, match=f"--object-pose {kind}: valid: udp:PORT"):
-        object_poses(kind, read_contract(blind))
+        udp_port(kind, "--object-pose")

@@ -16,7 +16,7 @@ from iowbc.onboard import messages
 from iowbc.onboard.checks import SafetyLimits
 from iowbc.onboard.machine import CycleInputs, Machine, OperatorRequest, State
 from iowbc.onboard.messages import Record
-from iowbc.onboard.operators import object_poses
+from iowbc.onboard.operators import Udp
 from iowbc.onboard.process import PERIOD
 from iowbc.onboard.ranges import Ranges
 from iowbc.sim.rendering.forces import Force
@@ -122,7 +122,7 @@ def test_a_policy_that_observes_the_object_carries_it_by_the_pose_that_the_robot
     posture = controller.settled_posture(standing)[0]
     simulation = exported_world(sighted).recipe.simulation
     twin = Twin(controller.robot, simulation, 50.0, "lift", 0, posture, Support("fixture", 0.2), fixed)
-    poses = object_poses("udp:0", controller.contract)
+    poses = Udp(Ranges(controller.contract), 0)
     tracking = ObjectTracking(poses.port)
     requests = {10: State.DAMPING, 20: State.STAND, 100: State.RUN}
     for turn in range(1500):

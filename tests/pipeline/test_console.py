@@ -47,7 +47,7 @@ def test_a_long_curve_is_thinned() -> None:
     view = StageView("teacher")
     for value in range(5 * CURVE_POINTS):
         view.measured("reward", value, value)
-    assert len(view.curve) <= CURVE_POINTS
+    assert len(view.record.curve) <= CURVE_POINTS
     assert view.values == sorted(view.values)
     assert view.values[-1] == 5 * CURVE_POINTS - 1
 
@@ -56,7 +56,7 @@ def test_a_curve_goes_on_where_the_checkpoint_was() -> None:
     view = StageView("teacher")
     for step in (1, 2, 3, 2, 3):
         view.measured("reward", step, 10.0 * step)
-    assert view.curve == [(1, 10.0), (2, 20.0), (3, 30.0)]
+    assert view.record.curve == [(1, 10.0), (2, 20.0), (3, 30.0)]
 
 
 def test_plain_lines_come_once_in_an_interval() -> None:

@@ -10,11 +10,12 @@ from iowbc.arrays import Array
 from iowbc.errors import UsageError
 from iowbc.learning.networks import TeacherNetwork
 from iowbc.live.drag import Drag
-from iowbc.live.game import GamePanel, GameRequest, GameSession
+from iowbc.live.game import ROBOTS, GamePanel, GameSession
 from iowbc.live.page import SETTLED, Page
 from iowbc.live.server import serving
 from iowbc.sim.rendering import appearance
 from iowbc.skill.lower_layer import Student
+from iowbc.skill.plan import PERSON, Plan, Rule
 from iowbc.task.specification import Specification
 
 ABOVE = np.array([-1.0, -1.5, 1.5])
@@ -31,8 +32,9 @@ def start(
     skill = TeacherNetwork(44 + 6 * world.recipe.skill.robot.history, 11, [8], "elu", 5.0).requires_grad_(False)
     begun: list[GameSession] = []
 
-    def starter(task: str = "lift_straight", robot: str = "stands", seed: int = 1, **held: float) -> GameSession:
-        begun.append(GameSession(world, student, skill, GameRequest(task, seed, robot, **held)))
+    def starter(task: str = "lift_straight", rule: Rule | None = "stand", seed: int = 1, **held: float) -> GameSession:
+        plan = Plan(task, PERSON, known=False, seed=seed, rule=rule, **held)
+        begun.append(GameSession(world, student, skill, plan))
         return begun[-1]
 
     yield starter
@@ -153,8 +155,8 @@ def test_a_game_that_ends_rests_until_it_is_begun_again(start: Callable[..., Gam
 
 def test_the_robots_to_compare_command_differently_in_the_same_game(start: Callable[..., GameSession]) -> None:
     commands, starts = [], []
-    for robot in ("skill", "admittance follower", "stands"):
-        session = start(robot=robot)
+    for rule in ROBOTS.values():
+        session = start(rule=rule)
         starts.append(session.track.moments[0].bodies)
         dragged(session, [0.15, 0.0, 0.0], 30)
         commands.append(tuple(session._lower.wanted[0, :3]))

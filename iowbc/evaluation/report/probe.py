@@ -6,12 +6,13 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from sklearn.metrics import root_mean_squared_error
 
 from iowbc.evaluation.probe import PRIVILEGED
 from iowbc.evaluation.report.aggregate import variants_of
 from iowbc.evaluation.report.captions import partner
 from iowbc.evaluation.report.figures import finish, style_of
-from iowbc.evaluation.report.statistics import determination_interval, r_squared, root_mean_square
+from iowbc.evaluation.report.statistics import determination_interval, r_squared
 from iowbc.results.picture import write_figure
 from iowbc.results.table import Column, Table, heads, measured, write_table
 
@@ -81,10 +82,10 @@ def figures_of(found: pd.DataFrame) -> dict[str, float]:
         "R2": r_squared(mass, read),
         "R2_low": low,
         "R2_high": high,
-        "RMSE": root_mean_square(mass, read),
+        "RMSE": root_mean_squared_error(mass, read),
         "R2_second": r_squared(*seconds.to_numpy().T),
         "R2_trial": r_squared(*trials.to_numpy().T),
-        "RMSE_trial": root_mean_square(*trials.to_numpy().T),
+        "RMSE_trial": root_mean_squared_error(*trials.to_numpy().T),
     }
 
 

@@ -125,8 +125,3 @@ def bootstrapped(value: float | NDArray[np.float64], resampled: NDArray[np.float
     """A statistic with its interval from its values over resamples (n,), which may be infinite."""
     low, high = np.quantile(resampled, ENDS, method="nearest")
     return Bootstrapped(float(value), float(low), float(high))
-
-
-def root_mean_square(true: NDArray[np.float64], inferred: NDArray[np.float64]) -> float:
-    """Root mean square of the errors, in the unit of the values."""
-    return float(np.sqrt(np.mean(np.square(true - inferred))))

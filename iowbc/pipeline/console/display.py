@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import IO
 
 from iowbc.pipeline.console.wording import duration, pace
+from iowbc.pipeline.store.workspace import Progress
 
 RATE_WINDOW = 60.0
 """Seconds over which a stage's rate is averaged."""
@@ -21,12 +22,8 @@ class StageView:
     name: str
     state: str = "waits"
     note: str = ""
-    done: float = 0.0
-    total: float = 0.0
-    metric: str = ""
-    """Name of the main metric: the first one that the stage reports."""
-    curve: list[tuple[float, float]] = field(default_factory=list)
-    """Steps and values of the main metric."""
+    record: Progress = field(default_factory=Progress)
+    """How far it is, and the curve of its main metric, the first one that it reports; shared with its workspace."""
     began: float | None = None
     """Start on the monotonic clock, shifted back by the time of earlier attempts [s]; None before it runs."""
     seconds: float | None = None
@@ -36,9 +33,9 @@ class StageView:
     def progress(self, done: float, total: float, note: str) -> None:
         """The stage is at `done` of `total`, in units of its own."""
         moment = time.monotonic()
-        if done < self.done or total != self.total:
+        if done < self.record.done or total != self.record.total:
             self._marks.clear()
-        self.done, self.total, self.note = done, total, note
+        self.record.done, self.record.total, self.note = done, total, note
         self._marks.append((moment, done))
         while len(self._marks) > 2 and moment - self._marks[0][0] > RATE_WINDOW:
             self._marks.popleft()
@@ -46,16 +43,16 @@ class StageView:
     def measured(self, metric: str, step: float, value: float) -> None:
         """Add the main metric's value at a step. Values of an earlier attempt from this step on are dropped; a long
         curve is thinned to every second value."""
-        self.metric = self.metric or metric
-        while self.curve and self.curve[-1][0] >= step:
-            self.curve.pop()
-        self.curve.append((step, value))
-        if len(self.curve) > CURVE_POINTS:
-            del self.curve[1::2]
+        self.record.metric, curve = self.record.metric or metric, self.record.curve
+        while curve and curve[-1][0] >= step:
+            curve.pop()
+        curve.append((step, value))
+        if len(curve) > CURVE_POINTS:
+            del curve[1::2]
 
     @property
     def values(self) -> list[float]:
-        return [value for _, value in self.curve]
+        return [value for _, value in self.record.curve]
 
     @property
     def spent(self) -> float | None:
@@ -74,13 +71,13 @@ class StageView:
     @property
     def left(self) -> float | None:
         """Time until the stage is done at the present rate [s]."""
-        rate = self.rate
-        return (self.total - self.done) / rate if rate and rate > 0.0 and self.total else None
+        rate, record = self.rate, self.record
+        return (record.total - record.done) / rate if rate and rate > 0.0 and record.total else None
 
     @property
     def share(self) -> float:
         """Part that is done, 0 to 1."""
-        return min(1.0, self.done / self.total) if self.total else 0.0
+        return min(1.0, self.record.done / self.record.total) if self.record.total else 0.0
 
 
 class Display:
@@ -124,8 +121,8 @@ class PlainDisplay(Display):
             parts.append(pace(view.rate))
         if view.left is not None:
             parts.append(f"{duration(view.left)} left")
-        if view.curve:
-            parts.append(f"{view.metric} {view.values[-1]:.4g}")
+        if view.values:
+            parts.append(f"{view.record.metric} {view.values[-1]:.4g}")
         self.say("  ".join([*parts, view.note] if view.note else parts))
 
     def say(self, text: str) -> None:

@@ -97,15 +97,15 @@ def _row(view: StageView) -> tuple[Text | ProgressBar | str, ...]:
     state = Text(view.state, style=STYLES.get(view.state, ""))
     if view.state != "runs":
         return Text(view.name), state, "", "", duration(view.spent), "", ""
-    bar = ProgressBar(total=1.0, completed=view.share, width=COLUMNS[""], pulse=not view.total)
-    done = f"{100 * view.share:.0f} %" if view.total else ""
+    bar = ProgressBar(total=1.0, completed=view.share, width=COLUMNS[""], pulse=not view.record.total)
+    done = f"{100 * view.share:.0f} %" if view.record.total else ""
     left = "finishing" if view.share == 1.0 else duration(view.left)
     return Text(view.name), state, bar, done, duration(view.spent), left, pace(view.rate)
 
 
 def _curve(view: StageView, room: int) -> Text:
     """The small curve with its name and last value, in so many characters."""
-    if not view.curve:
+    if not view.values:
         return Text("")
-    label = f"{view.metric} {view.values[-1]:.4g}"
+    label = f"{view.record.metric} {view.values[-1]:.4g}"
     return Text(f"{sparkline(view.values, max(4, min(CURVE_WIDTH, room - len(label) - 1)))} {label}")
