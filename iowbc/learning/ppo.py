@@ -20,6 +20,8 @@ from torch import Tensor
 
 from iowbc.arrays import Array
 from iowbc.learning.as_numpy import acting_policy
+from iowbc.learning.best import acting_part
+from iowbc.learning.checkpoint import Arrays, module_arrays, restore_module
 from iowbc.learning.computing import ParallelBatch, reduced
 from iowbc.learning.gaussian import autoregressive, divergence, entropy, log_density
 from iowbc.learning.groups import drawn_leaders, without_common_part
@@ -79,8 +81,8 @@ class Learner:
         self.learning_rate = teacher.learning_rate
         self.explained = 0.0
         """Explained variance of the value targets of the last rollout."""
-        self.former: ActorCritic | None = None
-        """The policy before the last update; None before the first one and after a rollback."""
+        self.former: Arrays = {}
+        """Acting part of the policy before the last update; empty before the first one and after a rollback."""
         self.gain: float | None = None
         """Mean normalised advantage that the last update gained, on the rollout after it: an estimate from samples that
         the update has not seen, while -`policy_loss` is one from those that it has."""
@@ -170,7 +172,7 @@ class Learner:
         if settings.group > 1:
             own = without_common_part(columns["advantage"].cpu().numpy(), found.ended, settings.group)
             columns["advantage"].copy_(torch.from_numpy(own))
-        self.gain = None if self.former is None else self._gain(self.former)
+        self.gain = self._gain() if self.former else None
         self.normalization.observe(self.policy.normalizer.newest(rows))
 
     def _tensor(self, values: Array) -> Tensor:
@@ -188,8 +190,10 @@ class Learner:
             own["log_density"].copy_(log_density(own["action"], own["mean"], policy.log_std, self._correlation))
             own["value"].copy_(policy.critic.head(policy.critic.hidden(own["observation"]))[..., 0])
 
-    def _gain(self, former: ActorCritic) -> float:
-        """Mean normalised advantage of the samples by which the policy betters a former one."""
+    def _gain(self) -> float:
+        """Mean normalised advantage of the samples by which the policy betters the former one."""
+        former = copy.deepcopy(self.policy)
+        restore_module(former, module_arrays(former) | self.former)
 
         def ratio(samples: Tensor) -> Tensor:
             own = self.samples.named(samples)
@@ -222,7 +226,7 @@ class Learner:
         for group, own in zip(optimizer.param_groups, rates, strict=True):
             group["lr"] = own
         before = self.policy.log_std.detach().clone()
-        self.former = copy.deepcopy(self.policy)
+        self.former = acting_part(module_arrays(self.policy))
         samples = self.samples.flat
         found: list[Tensor] = []
         for _ in range(settings.epochs):

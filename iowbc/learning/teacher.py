@@ -1,6 +1,5 @@
 """Teacher training by PPO (paper III-C)."""
 
-import copy
 import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -136,7 +135,7 @@ class TeacherTraining:
         """Inverse of `_learner_state`."""
         if self.average:
             self.average = acting_part(under("policy", learnt))
-        self.model.former = None
+        self.model.former = {}
         checkpoint.restore_module(self.model.policy, under("policy", learnt))
         checkpoint.restore_optimizer(self.model.policy.optimizer, under("optimizer", learnt))
         self.model.normalization.restore(under("normalization", learnt))
@@ -154,7 +153,7 @@ class TeacherTraining:
             "counters": np.array([model.steps]),
             "learning_rate": np.array([model.learning_rate]),
             **prefixed("average", self.average),
-            **({} if model.former is None else prefixed("former", checkpoint.module_arrays(model.former))),
+            **prefixed("former", model.former),
         }
 
     def begin(self, network: Network) -> None:
@@ -187,9 +186,7 @@ class TeacherTraining:
             self.average = under("average", arrays)
         self.best.restore(under("best", arrays))
         self.environments.restore(under("environment", arrays))
-        if former := under("former", arrays):
-            model.former = copy.deepcopy(model.policy)
-            checkpoint.restore_module(model.former, former)
+        model.former = under("former", arrays)
         model.observation = np.array(arrays["observation"])
         model.steps = int(arrays["counters"][0])
         model.learning_rate = float(arrays["learning_rate"][0])
