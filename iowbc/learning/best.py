@@ -46,8 +46,8 @@ class Best:
         self.rollbacks += 1
         if self.rollbacks > self.settings.rollbacks:
             raise StageFailed(
-                f"{why}, for the {self.rollbacks}th time since the best policy; lower teacher.desired_kl or "
-                "teacher.learning_rate, or raise teacher.check.rollbacks"
+                f"{why}, and all teacher.check.rollbacks ({self.settings.rollbacks}) are used up; lower "
+                "teacher.desired_kl or teacher.learning_rate, or raise it"
             )
         self.caution *= self.settings.caution
         self.low = 0
