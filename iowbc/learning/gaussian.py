@@ -12,13 +12,9 @@ from iowbc.robot.mirror import MirrorMap
 LOG_TWO_PI = math.log(2.0 * math.pi)
 
 
-def log_density(actions: Tensor, mean: Tensor, log_std: Tensor, correlation: float = 0.0) -> Tensor:
-    """log N(actions; mean, exp(log_std)²), summed over the action, (..., A) to (...).
-
-    `correlation`: of `autoregressive` noise; the density is then that given the previous actions, up to a constant,
-    for (..., T, A).
-    """
-    scaled = innovations((actions - mean) * torch.exp(-log_std), correlation)
+def log_density(actions: Tensor, mean: Tensor, log_std: Tensor) -> Tensor:
+    """log N(actions; mean, exp(log_std)²), summed over the action, (n, A) to (n,)."""
+    scaled = (actions - mean) * torch.exp(-log_std)
     return -0.5 * (scaled * scaled).sum(-1) - (log_std + 0.5 * LOG_TWO_PI).sum(-1)
 
 
@@ -27,14 +23,9 @@ def entropy(log_std: Tensor) -> Tensor:
     return (log_std + 0.5 + 0.5 * LOG_TWO_PI).sum(-1)
 
 
-def divergence(
-    mean: Tensor, log_std: Tensor, other_mean: Tensor, other_log_std: Tensor, correlation: float = 0.0
-) -> Tensor:
-    """D_KL(N(mean, std²) || N(other_mean, other_std²)) in closed form, summed over the action, (..., A) to (...).
-
-    `correlation`: see `log_density`.
-    """
-    squares = torch.exp(2.0 * log_std) + innovations(mean - other_mean, correlation) ** 2
+def divergence(mean: Tensor, log_std: Tensor, other_mean: Tensor, other_log_std: Tensor) -> Tensor:
+    """D_KL(N(mean, std²) || N(other_mean, other_std²)) in closed form, summed over the action, (n, A) to (n,)."""
+    squares = torch.exp(2.0 * log_std) + (mean - other_mean) ** 2
     return (other_log_std - log_std + 0.5 * squares * torch.exp(-2.0 * other_log_std) - 0.5).sum(-1)
 
 
@@ -53,11 +44,3 @@ def autoregressive(noise: Tensor, correlation: float) -> Tensor:
     for step in range(1, len(noise)):
         found[step] = correlation * found[step - 1] + math.sqrt(1.0 - correlation**2) * noise[step]
     return found
-
-
-def innovations(noise: Tensor, correlation: float) -> Tensor:
-    """Inverse of `autoregressive`, for (..., T, A)."""
-    if not correlation:
-        return noise
-    fresh = (noise[..., 1:, :] - correlation * noise[..., :-1, :]) / math.sqrt(1.0 - correlation**2)
-    return torch.cat([noise[..., :1, :], fresh], dim=-2)

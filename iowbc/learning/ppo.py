@@ -71,7 +71,7 @@ class Learner:
             **self._arguments,
         ).to(self.device)
         (inputs,), (actions,) = env.observation_space.shape, env.action_space.shape
-        self.samples = Samples(teacher.rollout, env.num_envs, inputs, actions, self.device, self._correlation > 0)
+        self.samples = Samples(teacher.rollout, env.num_envs, inputs, actions, self.device)
         size, mirror = len(self.policy.normalizer.mean), None if teacher.symmetry == "none" else mirrors[0]
         self.normalization = Normalization(size, env.num_envs, teacher.gamma, mirror)
         self.observation: Array | None = None
@@ -117,11 +117,6 @@ class Learner:
         model.policy.optimizer.load_state_dict(self.policy.optimizer.state_dict())
         model.num_timesteps = self.steps
         model.save(path)
-
-    @property
-    def _correlation(self) -> float:
-        """Correlation of the noise in its density."""
-        return self.settings.noise_correlation if self.settings.noise_density == "exact" else 0.0
 
     @property
     def _batch(self) -> int:
@@ -187,8 +182,8 @@ class Learner:
         policy, own = self.policy, self.samples.named(samples)
         with torch.inference_mode():
             own["mean"].copy_(self._mean(policy.actor, own))
-            own["log_density"].copy_(log_density(own["action"], own["mean"], policy.log_std, self._correlation))
-            own["value"].copy_(policy.critic.head(policy.critic.hidden(own["observation"]))[..., 0])
+            own["log_density"].copy_(log_density(own["action"], own["mean"], policy.log_std))
+            own["value"].copy_(policy.critic.head(policy.critic.hidden(own["observation"]))[:, 0])
 
     def _gain(self) -> float:
         """Mean normalised advantage of the samples by which the policy betters the former one."""
@@ -198,10 +193,10 @@ class Learner:
         def ratio(samples: Tensor) -> Tensor:
             own = self.samples.named(samples)
             with torch.inference_mode():
-                density = log_density(own["action"], self._mean(former.actor, own), former.log_std, self._correlation)
+                density = log_density(own["action"], self._mean(former.actor, own), former.log_std)
                 return torch.exp(density - own["log_density"])
 
-        advantage = self.samples.named(self.samples.flat)["advantage"]
+        advantage = self.samples.columns["advantage"].flatten()
         normal = (advantage - advantage.mean()) / (advantage.std() + 1e-8)
         return float((normal * (1.0 - torch.cat(self.in_parallel(ratio, self.samples.flat)))).mean())
 
@@ -231,10 +226,7 @@ class Learner:
         found: list[Tensor] = []
         for _ in range(settings.epochs):
             shuffled = torch.index_select(samples, 0, torch.randperm(len(samples)).to(self.device))
-            found += [
-                self._gradient_step(batch, before)
-                for batch in torch.split(shuffled, self._batch // (settings.rollout if self.samples.sequences else 1))
-            ]
+            found += [self._gradient_step(batch, before) for batch in torch.split(shuffled, self._batch)]
         every = torch.stack(found).view(settings.epochs, -1, len(FIGURES))
         means = dict(zip(FIGURES, every.mean((0, 1)).tolist(), strict=True))
         last = dict(zip(FIGURES, every[-1].mean(0).tolist(), strict=True))
@@ -278,15 +270,15 @@ class Learner:
         policy, settings, advantage = self.policy, self.settings, samples["advantage"]
         with reduced(settings.precision):
             acting, judging = policy.actor.hidden(samples["observation"]), policy.critic.hidden(samples["observation"])
-        mean, value, log_std = policy.actor.head(acting), policy.critic.head(judging)[..., 0], policy.log_std
-        difference = log_density(samples["action"], mean, log_std, self._correlation) - samples["log_density"]
+        mean, value, log_std = policy.actor.head(acting), policy.critic.head(judging)[:, 0], policy.log_std
+        difference = log_density(samples["action"], mean, log_std) - samples["log_density"]
         ratio = torch.exp(difference)
         clipped = torch.clamp(ratio, 1.0 - settings.clip, 1.0 + settings.clip)
         policy_loss = -torch.min(advantage * ratio, advantage * clipped).mean()
         value_loss = torch.nn.functional.mse_loss(value, samples["target"])
         loss = policy_loss + settings.value_weight * value_loss - settings.entropy * entropy(log_std)
         with torch.no_grad():
-            kl = divergence(samples["mean"], before, mean, log_std, self._correlation).mean()
+            kl = divergence(samples["mean"], before, mean, log_std).mean()
             sampled = (ratio - 1.0 - difference).mean()
             share = ((ratio - 1.0).abs() > settings.clip).float().mean()
             figures = torch.stack([policy_loss, value_loss, kl, sampled, share])

@@ -20,21 +20,13 @@ class Samples:
     """
 
     def __init__(
-        self,
-        steps: int,
-        environments: int,
-        observation: int,
-        actions: int,
-        device: torch.device | None = None,
-        sequences: bool = False,
+        self, steps: int, environments: int, observation: int, actions: int, device: torch.device | None = None
     ) -> None:
-        """`sequences`: `flat` keeps the T steps of an environment together."""
         acting = dict.fromkeys(("action", "mean"), actions)
         sizes = {"observation": observation, **acting, **dict.fromkeys(SINGLE, 1)}
         self.places = places(sizes)
         self.rows = torch.zeros(steps, environments, sum(sizes.values()), device=device)
         self.columns = self.named(self.rows)
-        self.sequences = sequences
 
     def named(self, rows: Tensor) -> dict[str, Tensor]:
         """Views of rows (..., width) by column name; scalar columns drop the last axis."""
@@ -43,8 +35,8 @@ class Samples:
 
     @property
     def flat(self) -> Tensor:
-        """All samples, (T·n, width), or sequences (n, T, width)."""
-        return self.rows.transpose(0, 1) if self.sequences else self.rows.view(-1, self.rows.shape[-1])
+        """All samples, (T·n, width)."""
+        return self.rows.view(-1, self.rows.shape[-1])
 
     def finish(self, rewards: Array, ended: Mask, last_value: Array, discount: float, decay: float) -> None:
         """Add advantages and targets; arguments as in `advantages`."""

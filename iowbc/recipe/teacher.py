@@ -148,9 +148,6 @@ class Teacher(PPO):
     noise_correlation: float = Field(default=0.0, ge=0.0, lt=1.0, json_schema_extra=LATER)
     """Correlation of the exploration noise between consecutive steps, as of a first-order autoregressive process, while
     the densities of PPO remain those of independent noise. 0: independent, as in the paper."""
-    noise_density: Literal["independent", "exact"] = Field(default="independent", json_schema_extra=LATER)
-    """Density in PPO's updates with `noise_correlation`: that of independent noise, or the exact one of an action given
-    the previous one."""
     restart: Restart | None = Field(default=None, json_schema_extra=LATER)
     """Warm restart of the exploration; empty: none."""
     average_half_life: int | None = Field(default=None, ge=1, le=10**12, json_schema_extra=LATER)
