@@ -138,7 +138,9 @@ def test_a_training_that_collapses_again_and_again_gives_up_and_says_what_to_low
     some, _ = training(Scores(0.6, 0.1, 0.1, 0.1))
     for _ in range(3):
         some.update()
-    with pytest.raises(StageFailed, match=r"fell from 0\.600 to 0\.100 at 512 steps.*rollbacks \(2\) are used up.*teacher\.desired_kl"):
+    with pytest.raises(
+        StageFailed, match=r"fell from 0\.600 to 0\.100.*rollbacks \(2\) are used up.*teacher\.desired_kl"
+    ):
         some.update()
 
 
