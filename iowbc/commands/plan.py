@@ -14,7 +14,7 @@ from iowbc.commands import options
 from iowbc.commands.printed import hanging, plain_table, print_json, shown_path, stdout_console, tell
 from iowbc.commands.request import Request, in_order, planners
 from iowbc.pipeline.console.wording import KEY_LENGTH, duration, short
-from iowbc.pipeline.planner import Planner
+from iowbc.pipeline.planner import Planner, Plans
 from iowbc.pipeline.stage import Stage
 from iowbc.pipeline.stage_plan import Options, StagePlan
 from iowbc.pipeline.store.digests import data_digest
@@ -42,7 +42,8 @@ def plan(
     """Print the stages that would run, and why; for several recipes, as of a study, a table."""
     asked = Options(until, frozenset(force or ()), on_code_change=on_code_change)
     request, console = Request(recipe, overrides or (), Runs(runs), asked), stdout_console()
-    each = [one for planner in planners(request) for one in in_order(planner)]
+    plans: Plans = {}
+    each = [one for planner in planners(request) for one in in_order(planner, plans)]
     longest: dict[tuple[Path, tuple[str, ...]], Planner] = {}
     for one in each:  # a recipe may be both requested and an origin of another one
         known = longest.setdefault((one.loaded.file, one.loaded.overrides), one)
@@ -50,16 +51,17 @@ def plan(
             longest[one.loaded.file, one.loaded.overrides] = one
     found = list(longest.values())
     if as_json:
-        data = [{"recipe": one.loaded.recipe.name, "stages": list(map(step_data, one.plan()))} for one in found]
+        data = [{"recipe": one.loaded.recipe.name, "stages": list(map(step_data, one.plan(plans)))} for one in found]
         print_json(console, data)
     elif len(found) == 1:
-        _print(found[0].plan(), console)
+        _print(found[0].plan(plans), console)
     else:
-        _print_several(request, found, console)
+        _print_several(request, found, plans, console)
 
 
-def planned(planners: Sequence[Planner]) -> Planned:
-    """The stages of each recipe for the current store; a stage that several recipes share runs once."""
+def planned(planners: Sequence[Planner], known: Plans | None = None) -> Planned:
+    """The stages of each recipe for the current store; a stage that several recipes share runs once. `known`: plans
+    that were just made."""
     makers: dict[str, str] = {}
     found: dict[str, list[StagePlan]] = {}
     for planner in planners:
@@ -68,7 +70,7 @@ def planned(planners: Sequence[Planner]) -> Planned:
             name = shlex.join([name, *(word for value in planner.loaded.overrides for word in ("--set", value))])
         identities: dict[str, str] = {}
         own = found.setdefault(name, [])
-        for step in planner.plan():
+        for step in planner.plan(known):
             identity = identities[step.stage.name] = step.key or _identity(planner, step.stage, identities)
             maker = name if step.cached else makers.setdefault(identity, name)
             own.append(replace(step, shared_with="" if maker == name else maker))
@@ -87,9 +89,9 @@ def _identity(planner: Planner, stage: Stage, before: Mapping[str, str]) -> str:
     return data_digest(ingredients)
 
 
-def _print_several(request: Request, planners: Sequence[Planner], console: Console) -> None:
+def _print_several(request: Request, planners: Sequence[Planner], known: Plans, console: Console) -> None:
     """Print a row for each recipe, a legend, the total, and a command that gives reasons."""
-    found = planned(planners)
+    found = planned(planners, known)
     console.print(plan_table(found, "recipe"))
     steps = [step for own in found.values() for step in own if not step.shared_with]
     rates = sorted({step.rate_of for step in steps if not step.cached and step.roughly is not None})

@@ -84,13 +84,14 @@ def prepared(loaded: LoadedRecipe, runs: Runs, options: Options) -> Planner:
     return planner_for(loaded, STAGES, Store(runs), folder, options)
 
 
-def in_order(planner: Planner) -> list[Planner]:
-    """Planners of all that runs for a recipe: first those from whose missing artifacts it begins, then itself."""
-    known: Plans = {}
+def in_order(planner: Planner, known: Plans | None = None) -> list[Planner]:
+    """Planners of all that runs for a recipe: first those from whose missing artifacts it begins, then itself.
+    `known`: receives their plans."""
+    known = {} if known is None else known
     if planner.origins:
         planner.plan(known)
     missing = [origin for origin in planner.origins.values() if not origin.plan(known)[-1].cached]
-    return list(dict.fromkeys([*(each for origin in missing for each in in_order(origin)), planner]))
+    return list(dict.fromkeys([*(each for origin in missing for each in in_order(origin, known)), planner]))
 
 
 @cache

@@ -123,18 +123,22 @@ class Planner:
             "inputs": {name: artifact.manifest.digest if artifact else None for name, artifact in inputs.items()},
             "robot": self.robot_digest,
         }
-        former = self._closest(stage.name, ingredients)
         there = {name: artifact for name, artifact in inputs.items() if artifact is not None}
         step = StagePlan(stage, code=stage_code(stage), inputs=there)
+        if not unknown:
+            keyed = replace(step, key=data_digest(ingredients), ingredients=ingredients)
+            step = self._with_cached_artifact(keyed, whole)
+            if step.artifact is not None and step.cached:
+                return step
+        former = self._closest(stage.name, ingredients)
         if former is not None:
             step = estimated(step, ingredients, self.store.artifacts(stage.name), former)
         if unknown:
             return replace(step, reasons=tuple(self._reasons(ingredients, former, unknown)))
-        step = self._with_cached_artifact(replace(step, key=data_digest(ingredients), ingredients=ingredients), whole)
         if step.artifact is None:
             why = [f"damaged: {step.damage}"] if step.damage else self._reasons(ingredients, former, ())
             step = replace(step, reasons=(*step.reasons, *why))
-        return self._with_resume_point(step) if step.reasons else step
+        return self._with_resume_point(step)
 
     def _with_cached_artifact(self, step: StagePlan, whole: bool) -> StagePlan:
         """The plan with the stored, undamaged artifact of its key, the reasons not to use it, and notes."""
