@@ -2,6 +2,7 @@
 
 import secrets
 import shutil
+from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,7 @@ import ray
 
 from iowbc.errors import Interrupted, IowbcError, StageFailed
 from iowbc.pipeline.cluster.folders import Files, SharedFolder, files_of, write_files
-from iowbc.pipeline.cluster.spread import POLL, TRIES, raised
+from iowbc.pipeline.cluster.spread import POLL, TRIES, NodeSpread, raised
 from iowbc.pipeline.cluster.stage_task import Event, Mailbox, execute, marker
 from iowbc.pipeline.code import identity
 from iowbc.pipeline.stage import Job, Stage
@@ -63,6 +64,10 @@ class Cluster:
             shutil.rmtree(job.out)
             job.out.mkdir()
         raise StageFailed(f"lost its node or worker {TRIES} times; is there too little memory for it?")
+
+    def spread(self, paths: Iterable[Path]) -> NodeSpread:
+        """The nodes for calls that read these folders of this machine."""
+        return NodeSpread({path: self._folder(path) for path in paths}, lambda: False, lambda text: None)
 
     def abort(self) -> None:
         self.aborted = True
