@@ -59,9 +59,10 @@ class Planner:
             steps[stage.name] = replace(step, expected=None, roughly=step.guess) if unknown else step
         for stage in reversed(self.stages):
             for name in stage.reads(self.loaded.recipe):
-                made = steps[name].artifact
-                if not steps[stage.name].cached and steps[name].cached and made is not None and not made.whole:
-                    steps[name] = replace(steps[name], reasons=(f"{NOT_WHOLE}; {stage.name} reads it",))
+                step, made = steps[name], steps[name].artifact
+                if not steps[stage.name].cached and step.cached and made is not None and not made.whole:
+                    timed = estimated(step, step.ingredients, self.store.artifacts(name), made)
+                    steps[name] = replace(timed, reasons=(f"{NOT_WHOLE}; {stage.name} reads it",))
         known[self] = list(steps.values())
         return known[self]
 

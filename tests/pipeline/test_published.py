@@ -72,6 +72,7 @@ def test_what_leaves_out_its_large_files_stands_for_its_digest_alone(
     assert workplace.ran() == ["eval"]
     steps = workplace.plan("teacher.gamma=0.9")
     assert steps["rg-fit"].reasons == ("its published artifact leaves out large files; distill reads it",)
+    assert steps["rg-fit"].expected is not None
     assert steps["rg-dataset"].cached
     workplace.run("teacher.gamma=0.9")
     assert workplace.ran() == ["rg-fit", "teacher"]
