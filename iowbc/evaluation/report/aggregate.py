@@ -51,11 +51,10 @@ def aggregate(trials: pd.DataFrame, labels: Mapping[str, str] = NO_LABELS) -> pd
     Columns: `name_in_paper`, or else the name here; number of `trainings`, pooled; `trials`, `survived`, `succeeded`;
     `held` (trials with an object in the hands) and `carried` (those that carried its weight); `pushed` and `kept`
     (those that did not lose the object); success `rate` with its Wilson interval `rate_low`, `rate_high`; means of all
-    metrics over surviving trials, or over all trials for `OVER_ALL_TRIALS`; `<error>_half`, half the 95 % interval
-    of an error; `norm` of the four errors; `torque_rms` of the joint with the largest mean, and its name
-    `torque_rms_joint`. Intervals use `WORLD` as clusters. NaN if no trial survived ("Fails" in the tables), for
-    half widths also if only one did. Metrics that trials of an
-    earlier version lack are missing here, too.
+    metrics over surviving trials, or over all trials for `OVER_ALL_TRIALS`; `<error>_half`, half the 95 % interval of
+    an error; `norm` of the four errors; `torque_rms` of the joint with the largest mean, and its name
+    `torque_rms_joint`. Intervals use `WORLD` as clusters. NaN if no trial survived ("Fails" in the tables), for half
+    widths also if only one did. Metrics that trials of an earlier version lack are missing here, too.
     """
     of_later_versions = ("E_v_raw", "E_v_raw_moving", *OVER_ALL_TRIALS, *SETTINGS)
     missing = [name for name in of_later_versions if name not in trials]

@@ -23,7 +23,7 @@ class StageView:
     state: str = "waits"
     note: str = ""
     record: Progress = field(default_factory=Progress)
-    """How far it is, and the curve of its main metric, the first one that it reports; shared with its workspace."""
+    """Progress and curve of the main metric, the first one reported. The same object as `Workspace.state`."""
     began: float | None = None
     """Start on the monotonic clock, shifted back by the time of earlier attempts [s]; None before it runs."""
     seconds: float | None = None
