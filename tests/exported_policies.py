@@ -81,7 +81,11 @@ def graph_of(
 def recipe() -> Recipe:
     references = {"gait": {"recovery": {}, "placement": {"integral": 0.1}, "spread": 0.04}, "torso": {}, "height": {}}
     return Recipe.model_validate(
-        {"name": "test", "task": {"references": references}, "export": {"acceptance": [], "golden_steps": 5}}
+        {
+            "name": "test",
+            "task": {"action": {"previous_share": 0.3}, "references": references},
+            "export": {"acceptance": [], "golden_steps": 5},
+        }
     )
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from iowbc.arrays import Array, Constants, namespace, places
 from iowbc.control import gait
-from iowbc.control.action import action_scale
+from iowbc.control.action import action_scale, applied_action
 from iowbc.control.command import COMMAND, YAW_RATE, approach, rate_limits
 from iowbc.control.observation import ObservationLayout, PolicyInputs
 from iowbc.control.references import ReferenceLayer
@@ -41,7 +41,7 @@ class State:
         "forward offset of left foot, right foot and both; stretch of both legs; turn of both hips",
     ]
     begun: Annotated[Array, "1", "-", "0 in the state that settle.onnx makes, 1 afterwards"]
-    action: Annotated[Array, "action", "joint", "residual action that the motors follow, support order"]
+    action: Annotated[Array, "action", "joint", "residual action of the policy, clipped, support order"]
     history: Annotated[Array, "SI", "-", "the last observations, oldest first"]
 
 
@@ -56,7 +56,7 @@ class StepResult:
     target: Array
     """Position targets of all joints, MJCF order, (n, joints) [rad]."""
     action: Array
-    """Residual action, clipped, (n, support joints)."""
+    """Residual action of the policy, clipped, (n, support joints)."""
     support_reference: Array
     """θ_S_ref with the gait prior, (n, support joints) [rad]."""
     state: State
@@ -76,7 +76,7 @@ class ControlStep(Constants):
     ) -> None:
         """`policy`: from a history (n, K, size of s_t) to the mean action (n, support joints)."""
         self.references, self.layout, self.policy = references, layout, policy
-        self.bound, self.scale = task.action.bound, action_scale(robot, task.action)
+        self.bound, self.scale, self._action = task.action.bound, action_scale(robot, task.action), task.action
         self._period = 1.0 / task.control_frequency
         self._largest_step = rate_limits(task.commands.rates) * self._period
         self._order = np.argsort(np.concatenate([robot.support, robot.interaction])).tolist()
@@ -140,7 +140,8 @@ class ControlStep(Constants):
         turned = state.heading_reference + command[:, YAW_RATE, None] * self._period
         clock, one = 1.0 * stepping[:, None], 1.0 + 0.0 * state.begun
         after = State(command, arms, posture, turned, phase[:, None], clock, feedback, one, action, history)
-        return StepResult(self._joints(support + self.scale * action, held), action, support, after)
+        applied = applied_action(action, state.action, self._action)
+        return StepResult(self._joints(support + self.scale * applied, held), action, support, after)
 
     def _joints(self, support: Array, arms: Array) -> Array:
         """Values of both branches in MJCF order, (n, joints)."""

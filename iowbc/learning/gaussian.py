@@ -35,12 +35,15 @@ def std_places(actions: int, mirror: MirrorMap | None) -> NDArray[np.int64]:
     return np.asarray(np.unique(own, return_inverse=True)[1], np.int64)
 
 
-def autoregressive(noise: Tensor, correlation: float) -> Tensor:
-    """Stationary first-order autoregressive noise, standard normal at each step, from independent noise (T, ...).
+def exploration(shape: tuple[int, int], log_std: Tensor, correlation: float, independent: float) -> Tensor:
+    """Exploration noise of T steps of n environments, (T, n, A), Gaussian with exp(log_std)² at each step.
 
-    correlation: between consecutive steps.
+    A share `independent` of its variance is independent from step to step; the rest is a stationary first-order
+    autoregressive process with this correlation between consecutive steps.
     """
-    found = noise.clone()
-    for step in range(1, len(noise)):
-        found[step] = correlation * found[step - 1] + math.sqrt(1.0 - correlation**2) * noise[step]
-    return found
+    found = torch.randn(*shape, len(log_std))
+    for step in range(1, len(found)):
+        found[step] = correlation * found[step - 1] + math.sqrt(1.0 - correlation**2) * found[step]
+    if independent:
+        found = math.sqrt(1.0 - independent) * found + math.sqrt(independent) * torch.randn_like(found)
+    return found * torch.exp(log_std)

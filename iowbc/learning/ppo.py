@@ -23,7 +23,7 @@ from iowbc.learning.as_numpy import acting_policy
 from iowbc.learning.best import acting_part
 from iowbc.learning.checkpoint import Arrays, module_arrays, restore_module
 from iowbc.learning.computing import ParallelBatch, reduced
-from iowbc.learning.gaussian import autoregressive, divergence, entropy, log_density
+from iowbc.learning.gaussian import divergence, entropy, exploration, log_density
 from iowbc.learning.groups import drawn_leaders, without_common_part
 from iowbc.learning.history_actor import student_architecture
 from iowbc.learning.networks import Mirrors, mirrors_as_json
@@ -134,8 +134,9 @@ class Learner:
         with torch.inference_mode():
             self.normalization.move(policy.normalizer)
             acting = policy if self._on_cpu else copy.deepcopy(policy).cpu()
-            normal = torch.randn(settings.rollout, env.num_envs, len(acting.log_std))
-            noise = autoregressive(normal, settings.noise_correlation) * torch.exp(acting.log_std)
+            noise = exploration(
+                (settings.rollout, env.num_envs), acting.log_std, settings.noise_correlation, settings.noise_independent
+            )
             rollout_policy = ExploringPolicy(acting_policy(acting), noise.numpy(), block_size(env.num_envs))
             found = env.roll(rollout_policy, settings.rollout)
         rolled = time.perf_counter()

@@ -148,6 +148,9 @@ class Teacher(PPO):
     noise_correlation: float = Field(default=0.0, ge=0.0, lt=1.0, json_schema_extra=LATER)
     """Correlation of the exploration noise between consecutive steps, as of a first-order autoregressive process, while
     the densities of PPO remain those of independent noise. 0: independent, as in the paper."""
+    noise_independent: float = Field(default=0.0, ge=0.0, le=1.0, json_schema_extra=LATER)
+    """Share of the exploration noise's variance that is independent from step to step beside `noise_correlation`. It
+    shows what correlated noise cannot, such as the cost of a jitter or of a hard landing."""
     restart: Restart | None = Field(default=None, json_schema_extra=LATER)
     """Warm restart of the exploration; empty: none."""
     average_half_life: int | None = Field(default=None, ge=1, le=10**12, json_schema_extra=LATER)

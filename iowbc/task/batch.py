@@ -7,7 +7,7 @@ import numpy as np
 
 from iowbc.arrays import Array, Indices, Keys, as_slice
 from iowbc.control import gait
-from iowbc.control.action import action_scale
+from iowbc.control.action import action_scale, applied_action
 from iowbc.control.command import HEIGHT, OFFSET, VELOCITY, YAW_RATE
 from iowbc.control.layout import EVERY
 from iowbc.control.observation import PolicyInputs
@@ -68,14 +68,20 @@ class Batch:
         self.judge = Judge(recipe, self.robot, self._holding, training=episodes is None)
         self._pushes = PlannedPushes(schedule.planned("push"), period)
         self._pulls = PlannedPulls(schedule.planned("pull"), period)
-        self._bound, self._scale = task.action.bound, action_scale(self.robot, task.action)
+        self._action, self._scale = task.action, action_scale(self.robot, task.action)
         arms = None if recipe.eval.public is None else recipe.eval.public.arms
         self._own_arms = np.flatnonzero([arms == "own" or (arms == "free" and name == FREE) for name in scenes])
         """Environments in which a public controller moves its arms, (k,)."""
 
     def targets(self, action: Array) -> Array:
         """Joint targets of an action (n, 15) in the next step, (n, joints) [rad]."""
-        return self.guidance.targets(self.memory, action.clip(-self._bound, self._bound))
+        return self.guidance.targets(self.memory, self._applied(self._clipped(action)))
+
+    def _clipped(self, action: Array) -> Array:
+        return action.clip(-self._action.bound, self._action.bound)
+
+    def _applied(self, action: Array) -> Array:
+        return applied_action(action, self.memory.action, self._action)
 
     def reset(self, seeds: Keys | None = None) -> None:
         """Starts an episode in every environment; `seeds` (n,) reseed all random number streams."""
@@ -102,8 +108,9 @@ class Batch:
         """One control step of every environment; those that end start a new episode."""
         memory, simulation = self.memory, self.simulation
         given, support = self.buffers["action"].astype(np.float64), len(self.robot.support)
-        action = given[:, :support].clip(-self._bound, self._bound)
-        simulation.target[:] = self.guidance.targets(memory, action)
+        action = self._clipped(given[:, :support])
+        applied = self._applied(action)
+        simulation.target[:] = self.guidance.targets(memory, applied)
         if len(self._own_arms):
             simulation.target[np.ix_(self._own_arms, self.robot.interaction)] = given[self._own_arms, support:]
         self.feed_partner(simulation.feed)
@@ -122,14 +129,14 @@ class Batch:
             disturbed=simulation.disturbed,
             resistance=simulation.drawn["rolling_resistance"],
         )
-        self.record(judgement, action)
+        self.record(judgement, applied)
         self.guidance.advance(memory, self._schedule.episode_key, self.simulation.measured)
         self.finish(judgement)
 
-    def record(self, judgement: Judgement, action: Array) -> None:
-        """Writes signals and counters of the step just made with an action (n, 15)."""
+    def record(self, judgement: Judgement, applied: Array) -> None:
+        """Writes signals and counters of the step just made, in which the motors followed an action (n, 15)."""
         statistics.count_step(self.buffers, judgement, self.memory)
-        motion, ending, correction = judgement.motion, judgement.ending, action * self._scale
+        motion, ending, correction = judgement.motion, judgement.ending, applied * self._scale
         step = Recorded(self.simulation, motion, self.memory, ending, correction, self.period)
         write_signals(self.buffers, step, planned=self._schedule.repeats)
 

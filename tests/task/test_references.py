@@ -178,3 +178,15 @@ def test_the_observed_references_are_those_that_the_joints_are_driven_to(make: M
     unit = batch.targets(np.ones((2, 15)))
     assert (unit - target)[:, robot.support] == pytest.approx(np.tile(robot.action_scale, (2, 1)))
     assert np.array_equal(unit[:, robot.interaction], target[:, robot.interaction])
+
+
+def test_motors_follow_a_share_of_the_previous_action(make: Make, robot: Robot) -> None:
+    """An action that alternates from step to step moves no joint target if half of each is the previous action."""
+    env = make(num_envs=2, changes=QUIET | {"task.action.previous_share": 0.5})
+    env.reset()
+    env.step(np.ones((2, 15), np.float32))
+    batch = env.batch
+    still = batch.targets(-np.ones((2, 15)))[:, robot.support] - batch.memory.support
+    assert still == pytest.approx(0.0, abs=1e-12)
+    moved = batch.targets(np.ones((2, 15)))[:, robot.support] - batch.memory.support
+    assert moved == pytest.approx(np.tile(robot.action_scale, (2, 1)))

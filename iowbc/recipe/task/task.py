@@ -19,6 +19,9 @@ class Action(Section):
     """Radians of joint target per unit of action, for every joint; empty: each joint's scale from `robot.yaml`."""
     bound: float = Field(default=5.0, gt=0.0)
     """Actions are clipped to plus and minus this, in units of action."""
+    previous_share: float = Field(default=0.0, ge=0.0, le=0.5, json_schema_extra=LATER)
+    """Share of the previous action in the joint targets, θ_S_ref + scale·((1 − p)·a_t + p·a_(t−1)). At 0.5 nothing
+    that alternates from step to step reaches the motors, which follow half a step later. 0: none, as in the paper."""
 
 
 class CustomPart(CustomFunction):
