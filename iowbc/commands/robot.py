@@ -3,7 +3,7 @@
 import signal
 import threading
 from collections.abc import Collection
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -168,7 +168,7 @@ def robot_sim(
     from iowbc.twin.support import Support
 
     console = stdout_console()
-    tracking = None if object_pose is None else ObjectTracking(udp_port(object_pose, "--object-pose"))
+    pose_port = None if object_pose is None else udp_port(object_pose, "--object-pose")
     folder = exported_folder(what)
     world, controller = exported_world(folder), Controller.load(folder)
     simulation = world.recipe.simulation
@@ -183,39 +183,36 @@ def robot_sim(
     frequency = controller.contract.control_frequency
     twin = Twin(controller.robot, simulation, frequency, scene, seed, posture, Support(kind, release), fixed)
     stop, reported = _stop_request(), False
-    view = None
-    if page is not None:
-        from iowbc.live.remote_view import RemoteView
+    with ExitStack() as stack:
+        tracking = None if pose_port is None else stack.enter_context(closing(ObjectTracking(pose_port)))
+        view = None
+        if page is not None:
+            from iowbc.live.remote_view import RemoteView
 
-        view = RemoteView(twin.simulation, page)
-        tell(console, f"http://{options.HOST}:{page}")
-    bus = DdsBus(network, domain)
-    tell(console, f"{controller.contract.robot} in scene {scene}, held by {kind}, on {network}; Ctrl+C ends")
+            view = stack.enter_context(closing(RemoteView(twin.simulation, page)))
+            tell(console, f"http://{options.HOST}:{page}")
+        bus = stack.enter_context(closing(DdsBus(network, domain)))
+        tell(console, f"{controller.contract.robot} in scene {scene}, held by {kind}, on {network}; Ctrl+C ends")
 
-    def watch(robot: Twin) -> None:
-        nonlocal reported, view
-        if tracking is not None:
-            tracking.send(robot)
-        if view is not None and robot.periods % POLLING == 0:
-            try:
-                _show(robot, view)
-            except EOFError:
-                view = None
-                tell(console, "the page has ended; the robot goes on")
-        if robot.fallen and not reported:
-            reported = True
-            tell(console, f"{robot.time:8.3f} s  fallen")
+        def watch(robot: Twin) -> None:
+            nonlocal reported, view
+            if tracking is not None:
+                tracking.send(robot)
+            if view is not None and robot.periods % POLLING == 0:
+                try:
+                    _show(robot, view)
+                except EOFError:
+                    view = None
+                    tell(console, "the page has ended; the robot goes on")
+            if robot.fallen and not reported:
+                reported = True
+                tell(console, f"{robot.time:8.3f} s  fallen")
 
-    def going() -> bool:
-        return not stop.is_set() and twin.time < seconds
+        def going() -> bool:
+            return not stop.is_set() and twin.time < seconds
 
-    serve(bus, twin, going, watch, lockstep=lockstep)
-    tell(console, twin.verdict)
-    bus.close()
-    if tracking is not None:
-        tracking.close()
-    if view is not None:
-        view.close()
+        serve(bus, twin, going, watch, lockstep=lockstep)
+        tell(console, twin.verdict)
 
 
 def _show(twin: "Twin", view: "RemoteView") -> None:
