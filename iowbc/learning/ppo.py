@@ -37,7 +37,7 @@ from iowbc.rollouts.blocks import block_size
 from iowbc.rollouts.rollout_policies import ExploringPolicy
 from iowbc.rollouts.trajectories import Trajectories
 
-FIGURES = ("policy_loss", "value_loss", "kl", "approx_kl", "clip_share")
+FIGURES = ("policy_loss", "value_loss", "kl", "approx_kl", "clip_share", "jitter")
 """Means over all minibatches; over those of the last epoch for `kl` and `approx_kl`."""
 
 
@@ -156,6 +156,7 @@ class Learner:
         columns["observation"].copy_(prepared.view(*shape, -1))
         columns["action"].copy_(self._tensor(found.action))
         self.in_parallel(self._judge, samples.flat)
+        samples.smooth(found.ended)
         steps = zip(found.reward, found.ended, strict=True)
         rewards = np.stack([self.normalization.reward(reward, ended) for reward, ended in steps])
         behind = np.concatenate([found.observation[-1], found.cut_observation])
@@ -277,12 +278,15 @@ class Learner:
         clipped = torch.clamp(ratio, 1.0 - settings.clip, 1.0 + settings.clip)
         policy_loss = -torch.min(advantage * ratio, advantage * clipped).mean()
         value_loss = torch.nn.functional.mse_loss(value, samples["target"])
+        jitter = 0.5 * torch.square((mean - samples["smooth_mean"]) * torch.exp(-before)).sum(-1).mean()
         loss = policy_loss + settings.value_weight * value_loss - settings.entropy * entropy(log_std)
+        if settings.smoothing:
+            loss = loss + settings.smoothing * jitter
         with torch.no_grad():
             kl = divergence(samples["mean"], before, mean, log_std).mean()
             sampled = (ratio - 1.0 - difference).mean()
             share = ((ratio - 1.0).abs() > settings.clip).float().mean()
-            figures = torch.stack([policy_loss, value_loss, kl, sampled, share])
+            figures = torch.stack([policy_loss, value_loss, kl, sampled, share, jitter])
         return loss, figures
 
 

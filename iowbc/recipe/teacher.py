@@ -151,6 +151,9 @@ class Teacher(PPO):
     noise_independent: float = Field(default=0.0, ge=0.0, le=1.0, json_schema_extra=LATER)
     """Share of the exploration noise's variance that is independent from step to step beside `noise_correlation`. It
     shows what correlated noise cannot, such as the cost of a jitter or of a hard landing."""
+    smoothing: float = Field(default=0.0, ge=0.0, json_schema_extra=LATER)
+    """Weight of the KL divergence of the policy from one whose mean action is the average of its means one step before
+    and one after. This cost of a jitter has an exact gradient, whereas that of `reward.smooth` is lost in the noise."""
     restart: Restart | None = Field(default=None, json_schema_extra=LATER)
     """Warm restart of the exploration; empty: none."""
     average_half_life: int | None = Field(default=None, ge=1, le=10**12, json_schema_extra=LATER)
