@@ -73,7 +73,8 @@ class LockStep:
             if self._tick < last:  # the robot has restarted, and time goes on
                 self._begin = self._now
             self._now = self._begin + 1e-3 * self._tick
-        else:
+        else:  # the robot's time stands still while it waits
+            self._begin += PATIENCE
             self._now += PATIENCE
         return self._now, states
 

@@ -69,19 +69,24 @@ def test_a_terminal_that_is_gone_does_not_end_the_loop(still: Still) -> None:
     assert (driven(still, 100, tell=gone).commands[99]["motor_cmd"]["kp"][:29] > 0.0).all()
 
 
-def test_in_lock_step_time_goes_on_when_the_robot_restarts() -> None:
-    ticks = iter((1000, None, 0, 2))
+@pytest.mark.parametrize(
+    ("ticks", "times"),
+    [((1000, None, 0, 2), (1.0, 2.0, 2.0, 2.002)), ((1000, None, 1002, 1004), (1.0, 2.0, 2.002, 2.004))],
+    ids=["restarts", "waits"],
+)
+def test_in_lock_step_time_goes_on_when_the_robot(ticks: tuple[int | None, ...], times: tuple[float, ...]) -> None:
+    coming = iter(ticks)
 
     def take(kind: Any) -> list[Record]:
         state = messages.empty(messages.LOW_STATE)
-        if (tick := next(ticks)) is None:
+        if (tick := next(coming)) is None:
             return []
         state["tick"] = tick
         return [state]
 
     bus: Any = SimpleNamespace(wait=lambda kind, seconds: True, take=take)
     clock = LockStep()
-    assert [clock.turn(bus)[0] for _ in range(4)] == pytest.approx([1.0, 2.0, 2.0, 2.002])
+    assert [clock.turn(bus)[0] for _ in range(4)] == pytest.approx(times)
 
 
 def test_a_full_disk_ends_the_log_alone(still: Still, tmp_path: Path) -> None:
