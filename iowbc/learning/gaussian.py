@@ -35,15 +35,10 @@ def std_places(actions: int, mirror: MirrorMap | None) -> NDArray[np.int64]:
     return np.asarray(np.unique(own, return_inverse=True)[1], np.int64)
 
 
-def exploration(shape: tuple[int, int], log_std: Tensor, correlation: float, independent: float) -> Tensor:
-    """Exploration noise of T steps of n environments, (T, n, A), Gaussian with exp(log_std)² at each step.
-
-    A share `independent` of its variance is independent from step to step; the rest is a stationary first-order
-    autoregressive process with this correlation between consecutive steps.
-    """
+def exploration(shape: tuple[int, int], log_std: Tensor, correlation: float) -> Tensor:
+    """Exploration noise of T steps of n environments, (T, n, A), with exp(log_std) as standard deviation: stationary
+    first-order autoregressive noise with this correlation between consecutive steps."""
     found = torch.randn(*shape, len(log_std))
     for step in range(1, len(found)):
         found[step] = correlation * found[step - 1] + math.sqrt(1.0 - correlation**2) * found[step]
-    if independent:
-        found = math.sqrt(1.0 - independent) * found + math.sqrt(independent) * torch.randn_like(found)
     return found * torch.exp(log_std)

@@ -134,9 +134,7 @@ class Learner:
         with torch.inference_mode():
             self.normalization.move(policy.normalizer)
             acting = policy if self._on_cpu else copy.deepcopy(policy).cpu()
-            noise = exploration(
-                (settings.rollout, env.num_envs), acting.log_std, settings.noise_correlation, settings.noise_independent
-            )
+            noise = exploration((settings.rollout, env.num_envs), acting.log_std, settings.noise_correlation)
             rollout_policy = ExploringPolicy(acting_policy(acting), noise.numpy(), block_size(env.num_envs))
             found = env.roll(rollout_policy, settings.rollout)
         rolled = time.perf_counter()

@@ -62,24 +62,16 @@ def test_the_closed_form_does_not_depend_on_which_actions_were_drawn() -> None:
 
 def test_correlated_noise_is_standard_normal_at_every_step_and_forgets_geometrically() -> None:
     torch.manual_seed(0)
-    noise = exploration((30, 4000), torch.zeros(3), 0.8, 0.0)
+    noise = exploration((30, 4000), torch.zeros(3), 0.8)
     torch.testing.assert_close(noise.square().mean((1, 2)), torch.ones(30), rtol=0, atol=0.05)
     for lag in (1, 3):
         found = (noise[lag:] * noise[:-lag]).mean((1, 2))
         torch.testing.assert_close(found, torch.full_like(found, 0.8**lag), rtol=0, atol=0.05)
 
 
-def test_an_independent_share_of_the_noise_keeps_its_variance_and_lowers_its_correlation() -> None:
-    torch.manual_seed(0)
-    noise = exploration((30, 4000), torch.full((3,), math.log(0.5)), 0.8, 0.25)
-    torch.testing.assert_close(noise.square().mean((1, 2)), torch.full((30,), 0.25), rtol=0, atol=0.02)
-    found = (noise[1:] * noise[:-1]).mean((1, 2)) / 0.25
-    torch.testing.assert_close(found, torch.full_like(found, 0.75 * 0.8), rtol=0, atol=0.05)
-
-
 def test_noise_without_correlation_is_independent() -> None:
     torch.manual_seed(0)
-    noise = exploration((30, 40), torch.zeros(3), 0.0, 0.0)
+    noise = exploration((30, 40), torch.zeros(3), 0.0)
     torch.manual_seed(0)
     torch.testing.assert_close(noise, torch.randn(30, 40, 3), rtol=0, atol=0)
 
