@@ -93,6 +93,8 @@ class Recipe(Section):
                 "compares the pelvis with its commanded height, and rg.height: com commands that of the centre of mass"
             )
             yield "task.references.height", text
+        if self.task.action.previous_share and self.eval.policy in ("model", "public"):
+            yield "task.action.previous_share", f"eval.policy: {self.eval.policy} sets joint targets itself; take 0"
         yield from scene_name_problems(self)
         yield from held_delay_problems(self.eval, "eval", self.eval.simulation or self.simulation)
 

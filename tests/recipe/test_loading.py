@@ -118,6 +118,12 @@ def test_feedback_on_the_feet_of_a_gait_prior_that_is_off_is_refused(tmp_path: P
     assert "height: stretches the legs of the gait prior, which is off" in text
 
 
+def test_a_controller_that_sets_joint_targets_itself_follows_no_previous_action(tmp_path: Path) -> None:
+    (found,) = problems(tmp_path, "task: {action: {previous_share: 0.5}}\neval: {policy: model}\n")
+    assert "task.action.previous_share" in found
+    assert "eval.policy: model" in found
+
+
 def test_a_number_where_text_belongs_is_asked_for_in_quotes(tmp_path: Path) -> None:
     (text,) = problems(tmp_path, "name: 1e3\n")
     assert text == "mine.yaml:1:1: key 'name' = 1000.0: should be text; in quotes, a word that reads as a number is"
