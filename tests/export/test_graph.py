@@ -75,12 +75,14 @@ def test_history_is_shifted_or_filled_with_the_first_observation(graph: Controll
 
 
 def test_the_action_is_the_students_for_that_history(graph: ControllerGraph, robot: Robot) -> None:
-    outputs = run_torch(graph.step, random_inputs(graph, 16))
+    inputs = random_inputs(graph, 16)
+    outputs = run_torch(graph.step, inputs)
     with torch.inference_mode():
         action = graph.student(torch.from_numpy(part(graph, outputs["state_next"], "history").copy())).numpy()
     bound = graph.equations.bound
     assert np.array_equal(outputs["action"], np.clip(action, -bound, bound))
-    scaled = outputs["support_reference"] + graph.equations.scale * outputs["action"]
+    followed = 0.7 * outputs["action"] + 0.3 * part(graph, inputs["state"], "action")
+    scaled = outputs["support_reference"] + graph.equations.scale * followed
     assert outputs["target"][:, robot.support] == pytest.approx(scaled, abs=1e-6)
 
 
