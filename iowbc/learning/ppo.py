@@ -276,7 +276,7 @@ class Learner:
         clipped = torch.clamp(ratio, 1.0 - settings.clip, 1.0 + settings.clip)
         policy_loss = -torch.min(advantage * ratio, advantage * clipped).mean()
         value_loss = torch.nn.functional.mse_loss(value, samples["target"])
-        jitter = 0.5 * torch.square((mean - samples["smooth_mean"]) * torch.exp(-before)).sum(-1).mean()
+        jitter = divergence(mean, before, samples["smooth_mean"], before).mean()
         loss = policy_loss + settings.value_weight * value_loss - settings.entropy * entropy(log_std)
         if settings.smoothing:
             loss = loss + settings.smoothing * jitter
