@@ -34,7 +34,6 @@ TITLES = {
     "train/imitation_scale": "size of the scripted leader's action",
     "train/std": "standard deviation of the action",
     "train/explained_variance": "variance explained by the value [share]",
-    "train/jitter": "KL divergence from the policy smoothed over steps [nat]",
     "train/gain": "advantage gained by an update, on the next rollout",
     "steps_per_second": "environment steps a second [1/s]",
     "kl": "KL divergence from the teacher [nat]",

@@ -37,7 +37,7 @@ from iowbc.rollouts.blocks import block_size
 from iowbc.rollouts.rollout_policies import ExploringPolicy
 from iowbc.rollouts.trajectories import Trajectories
 
-FIGURES = ("policy_loss", "value_loss", "kl", "approx_kl", "clip_share", "jitter")
+FIGURES = ("policy_loss", "value_loss", "kl", "approx_kl", "clip_share")
 """Means over all minibatches; over those of the last epoch for `kl` and `approx_kl`."""
 
 
@@ -154,7 +154,6 @@ class Learner:
         columns["observation"].copy_(prepared.view(*shape, -1))
         columns["action"].copy_(self._tensor(found.action))
         self.in_parallel(self._judge, samples.flat)
-        samples.smooth(found.ended)
         steps = zip(found.reward, found.ended, strict=True)
         rewards = np.stack([self.normalization.reward(reward, ended) for reward, ended in steps])
         behind = np.concatenate([found.observation[-1], found.cut_observation])
@@ -276,15 +275,12 @@ class Learner:
         clipped = torch.clamp(ratio, 1.0 - settings.clip, 1.0 + settings.clip)
         policy_loss = -torch.min(advantage * ratio, advantage * clipped).mean()
         value_loss = torch.nn.functional.mse_loss(value, samples["target"])
-        jitter = divergence(mean, before, samples["smooth_mean"], before).mean()
         loss = policy_loss + settings.value_weight * value_loss - settings.entropy * entropy(log_std)
-        if settings.smoothing:
-            loss = loss + settings.smoothing * jitter
         with torch.no_grad():
             kl = divergence(samples["mean"], before, mean, log_std).mean()
             sampled = (ratio - 1.0 - difference).mean()
             share = ((ratio - 1.0).abs() > settings.clip).float().mean()
-            figures = torch.stack([policy_loss, value_loss, kl, sampled, share, jitter])
+            figures = torch.stack([policy_loss, value_loss, kl, sampled, share])
         return loss, figures
 
 

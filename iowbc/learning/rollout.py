@@ -15,15 +15,14 @@ SINGLE = ("log_density", "value", "advantage", "target")
 class Samples:
     """Samples of T steps of n environments as rows, so that an epoch shuffles them with a single gather.
 
-    `columns` are views of the rows by name: prepared observation, action, the policy's mean, the average of the means
-    one step before and after, log density and value before the update, advantage and value target. Each rollout
-    overwrites the previous one.
+    `columns` are views of the rows by name: prepared observation, action, the policy's mean, log density and
+    value before the update, advantage and value target. Each rollout overwrites the previous one.
     """
 
     def __init__(
         self, steps: int, environments: int, observation: int, actions: int, device: torch.device | None = None
     ) -> None:
-        acting = dict.fromkeys(("action", "mean", "smooth_mean"), actions)
+        acting = dict.fromkeys(("action", "mean"), actions)
         sizes = {"observation": observation, **acting, **dict.fromkeys(SINGLE, 1)}
         self.places = places(sizes)
         self.rows = torch.zeros(steps, environments, sum(sizes.values()), device=device)
@@ -38,14 +37,6 @@ class Samples:
     def flat(self) -> Tensor:
         """All samples, (T·n, width)."""
         return self.rows.view(-1, self.rows.shape[-1])
-
-    def smooth(self, ended: Mask) -> None:
-        """Fill `smooth_mean`; it is the mean itself in the first and last step of an episode or rollout. `ended`:
-        (T, n), where an episode ended with the step."""
-        mean, found = self.columns["mean"], self.columns["smooth_mean"]
-        found.copy_(mean)
-        inside = torch.from_numpy(~(ended[:-2] | ended[1:-1])).to(mean.device)[..., None]
-        found[1:-1] = torch.where(inside, 0.5 * (mean[:-2] + mean[2:]), mean[1:-1])
 
     def finish(self, rewards: Array, ended: Mask, last_value: Array, discount: float, decay: float) -> None:
         """Add advantages and targets; arguments as in `advantages`."""

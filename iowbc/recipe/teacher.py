@@ -148,9 +148,6 @@ class Teacher(PPO):
     noise_correlation: float = Field(default=0.0, ge=0.0, lt=1.0, json_schema_extra=LATER)
     """Correlation of the exploration noise between consecutive steps, as of a first-order autoregressive process, while
     the densities of PPO remain those of independent noise. 0: independent, as in the paper."""
-    smoothing: float = Field(default=0.0, ge=0.0, json_schema_extra=LATER)
-    """Weight of the KL divergence of the policy from one whose mean action is the average of its means one step before
-    and one after. This cost of a jitter has an exact gradient, whereas that of `reward.smooth` is lost in the noise."""
     restart: Restart | None = Field(default=None, json_schema_extra=LATER)
     """Warm restart of the exploration; empty: none."""
     average_half_life: int | None = Field(default=None, ge=1, le=10**12, json_schema_extra=LATER)

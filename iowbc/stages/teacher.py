@@ -25,7 +25,7 @@ VIDEOS = "videos"
 PANELS = (
     *("episode_seconds", "terminations/fallen", "terminations/dropped", "reward", "curriculum_level"),
     *(f"check/{name}" for name in ("score", "survived", "E_v", "transport")),
-    *(f"train/{name}" for name in ("kl", "clip_share", "jitter", "learning_rate", "std", "explained_variance", "gain")),
+    *(f"train/{name}" for name in ("kl", "clip_share", "learning_rate", "std", "explained_variance", "gain")),
     "steps_per_second",
 )
 """Shown in the figure of the learning curves, before the reward's terms."""

@@ -4,7 +4,7 @@ import numpy as np
 import torch
 
 from iowbc.learning.gaussian import divergence, entropy, exploration, log_density
-from iowbc.learning.rollout import Samples, advantages
+from iowbc.learning.rollout import advantages
 
 
 def column(*values: float) -> np.ndarray:
@@ -74,15 +74,3 @@ def test_noise_without_correlation_is_independent() -> None:
     noise = exploration((30, 40), torch.zeros(3), 0.0)
     torch.manual_seed(0)
     torch.testing.assert_close(noise, torch.randn(30, 40, 3), rtol=0, atol=0)
-
-
-def test_means_are_smoothed_over_the_steps_of_an_episode() -> None:
-    samples = Samples(steps=5, environments=2, observation=1, actions=1)
-    means = torch.tensor([[0.0, 0.0], [1.0, 1.0], [4.0, 4.0], [9.0, 9.0], [16.0, 16.0]])
-    samples.columns["mean"].copy_(means[..., None])
-    ended = np.zeros((5, 2), np.bool_)
-    ended[1, 1] = True
-    samples.smooth(ended)
-    found = samples.columns["smooth_mean"][..., 0]
-    torch.testing.assert_close(found[:, 0], torch.tensor([0.0, 2.0, 5.0, 10.0, 16.0]))
-    torch.testing.assert_close(found[:, 1], torch.tensor([0.0, 1.0, 4.0, 10.0, 16.0]))

@@ -171,7 +171,6 @@ def test_what_the_value_alone_is_told_is_hidden_from_a_policy_that_knew_it() -> 
         {"symmetry": "none"},
         {"symmetry": "none", "group": 4},
         {"symmetry": "construction", "noise_correlation": 0.7},
-        {"symmetry": "construction", "smoothing": 0.01},
     ],
 )
 def test_training_learns_to_bring_masses_to_rest(changes: dict[str, Any]) -> None:
