@@ -6,30 +6,11 @@ from operator import attrgetter
 import numpy as np
 
 from iowbc.arrays import Array, Mask
-from iowbc.recipe.task.reward import CustomTerm, Kernel, Reward
+from iowbc.recipe.task.reward import CustomTerm, Reward
 from iowbc.task.own_function import load_function
 from iowbc.task.rewards.table import ONCE, TERMS, TRACKED, Step, Term
 
 CONTRACT = "it takes a Step (iowbc/task/rewards/table.py) and returns a finite number for each environment, shape (n,)"
-
-
-class WeightedTerm:
-    """A term with its weight and kernel width."""
-
-    def __init__(self, column: int, function: Term, setting: float | Kernel | CustomTerm, seconds: float) -> None:
-        """`column`: index among all terms; `setting`: weight, per second or per event, in the recipe; `seconds`: time
-        for which it is given in a control step."""
-        self.column, self._function = column, function
-        weight, self._width = (setting, None) if isinstance(setting, float | int) else (setting.weight, setting.width)
-        self.weight = weight * seconds
-        """Reward per control step for the value 1."""
-
-    def value(self, step: Step) -> Array:
-        """Value before weighting, (n,)."""
-        value: Array = np.asarray(self._function(step))
-        if self._width is not None:
-            value = kernel(value, self._width)
-        return value if value.ndim == 1 else value.sum(axis=1)
 
 
 def term_names(recipe: Reward) -> tuple[str, ...]:
@@ -43,33 +24,33 @@ class RewardFunction:
     def __init__(self, recipe: Reward, period: float, *, own: bool = False) -> None:
         """`period`: control period [s]; `own`: execute the user-defined terms, which are zero otherwise. Raises
         StageFailed for one that cannot be used."""
-        self._columns = len(TERMS) + len(recipe.own_terms)
+        self._weights, self._change = np.zeros((2, len(TERMS) + len(recipe.own_terms)))
+        """Rewards per control step for the value 1, and their later change."""
+        self._terms: list[tuple[int, Term, float | None]] = []
+        """Columns of the terms to compute, their functions, and widths of the kernels."""
         seconds = dict.fromkeys(ONCE, 1.0) | {path: 0.0 for path in TERMS if path.partition(".")[0] in recipe.without}
         functions = TERMS | (load_terms(recipe) if own else {})
         settings = {path: attrgetter(path)(recipe) for path in TERMS}
         settings |= {f"own.{name}": term for name, term in recipe.own_terms.items()}
-        weighted = {
-            path: WeightedTerm(column, function, settings[path], seconds.get(path, period))
-            for column, (path, function) in enumerate(functions.items())
-        }
-        self._terms = [term for path, term in weighted.items() if term.weight != 0.0 or path in TRACKED]
-        self._tracked = [weighted[path].column for path in TRACKED]
-        self._once = [weighted[path].column for path in ONCE]
-        self._weights, self._change = np.zeros(self._columns), np.zeros(self._columns)
-        self._weights[[term.column for term in weighted.values()]] = [term.weight for term in weighted.values()]
-        self._later = recipe.later
-        for path, weight in (recipe.later.weights if recipe.later else {}).items():
-            changed = weighted[path]
-            self._change[changed.column] = weight * seconds.get(path, period) - changed.weight
-            if changed not in self._terms:
-                self._terms.append(changed)
+        self._later, later = recipe.later, recipe.later.weights if recipe.later else {}
+        for column, (path, function) in enumerate(functions.items()):
+            setting, given = settings[path], seconds.get(path, period)
+            weight, width = (setting, None) if isinstance(setting, float | int) else (setting.weight, setting.width)
+            weight *= given
+            self._weights[column] = weight
+            self._change[column] = later[path] * given - weight if path in later else 0.0
+            if weight != 0.0 or path in TRACKED or path in later:
+                self._terms.append((column, function, width))
+        self._tracked, self._once = ([[*functions].index(path) for path in paths] for paths in (TRACKED, ONCE))
 
     def __call__(self, step: Step, diverged: Mask, level: Array) -> tuple[Array, Array]:
         """Each term's part of the reward of a step, (n, terms), and scores of the terms `TRACKED`, (n, tracked).
         `level`: of locomotion, (n,). `diverged` environments, (n,), get the penalty of a fall and no other term."""
-        terms = np.zeros((len(step.command), self._columns))
-        for term in self._terms:
-            terms[:, term.column] = term.value(step)
+        terms = np.zeros((len(step.command), len(self._weights)))
+        for column, function, width in self._terms:
+            value = np.asarray(function(step))
+            value = value if width is None else kernel(value, width)
+            terms[:, column] = value if value.ndim == 1 else value.sum(axis=1)
         if diverged.any():
             terms[diverged] = 0.0
             terms[diverged, self._once] = 1.0
