@@ -53,8 +53,7 @@ assert numpy.isfinite(made.Jc).all() and abs(made.Jc).sum() > 0
 """Computes a contact of a free body; mismatched binaries of crocoddyl and pinocchio crash here."""
 
 PICTURE = """
-from iowbc.sim.rendering.backend import backend
-from iowbc.sim.rendering.offscreen import Offscreen, mujoco
+from iowbc.sim.rendering.offscreen import Offscreen, backend, mujoco
 model = mujoco.MjModel.from_xml_string("<mujoco/>")
 with Offscreen(model, width=64, height=64, distance=1.0, azimuth=0.0, elevation=0.0) as picture:
     picture.draw(mujoco.MjData(model))

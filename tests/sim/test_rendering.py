@@ -11,7 +11,7 @@ from stepping import run
 
 from iowbc.recipe.simulation.simulation import SimulationSettings as Recipe
 from iowbc.sim.rendering import appearance as look
-from iowbc.sim.rendering import backend as headless
+from iowbc.sim.rendering import offscreen
 from iowbc.sim.rendering.forces import COLOURS, SMALLEST_FORCE
 from iowbc.sim.rendering.offscreen import MARGIN
 from iowbc.sim.rendering.renderer import SceneRenderer
@@ -102,8 +102,8 @@ def test_meshes_sit_on_the_links_of_the_robot_where_they_are_installed(robot):
 
 def test_drawing_switched_off_says_how_to_switch_it_on(monkeypatch):
     monkeypatch.setenv("MUJOCO_GL", "off")
-    with pytest.raises(headless.NoRenderer, match="unset it or set it to one of egl, osmesa"):
-        headless.backend()
+    with pytest.raises(offscreen.NoRenderer, match="unset it or set it to one of egl, osmesa"):
+        offscreen.backend()
 
 
 @pytest.mark.parametrize("asked", ["osmesa", "egl", "nonsense"])
@@ -112,11 +112,11 @@ def test_a_command_loads_the_simulation_and_says_why_nothing_is_drawn(asked):
         "from iowbc.__main__ import load_no_graphics\n"
         "load_no_graphics()\n"
         "import mujoco\n"
-        "from iowbc.sim.rendering import backend\n"
-        "backend.ctypes.util.find_library = lambda name: None\n"
+        "from iowbc.sim.rendering import offscreen\n"
+        "offscreen.ctypes.util.find_library = lambda name: None\n"
         "mujoco.mj_step(*(lambda m: (m, mujoco.MjData(m)))(mujoco.MjModel.from_xml_string('<mujoco/>')))\n"
-        "try:\n    backend.context(8, 8)\n"
-        "except backend.NoRenderer as error:\n    print(error)\n"
+        "try:\n    offscreen.context(8, 8)\n"
+        "except offscreen.NoRenderer as error:\n    print(error)\n"
     )
     environment = os.environ | {"MUJOCO_GL": asked, "PYOPENGL_PLATFORM": "glx"}
     done = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=False)
@@ -126,9 +126,9 @@ def test_a_command_loads_the_simulation_and_says_why_nothing_is_drawn(asked):
 
 def test_without_libraries_the_error_names_the_package(monkeypatch):
     monkeypatch.delenv("MUJOCO_GL", raising=False)
-    monkeypatch.setattr(headless.ctypes.util, "find_library", lambda name: None)
-    with pytest.raises(headless.NoRenderer, match="apt-get install libosmesa6"):
-        headless.backend()
+    monkeypatch.setattr(offscreen.ctypes.util, "find_library", lambda name: None)
+    with pytest.raises(offscreen.NoRenderer, match="apt-get install libosmesa6"):
+        offscreen.backend()
 
 
 def test_a_picture_larger_than_the_buffer_is_refused(start):
