@@ -22,15 +22,6 @@ class LabelledRegion:
     """Fraction of the samples around a command that have a label; -1 for too few samples."""
 
 
-@dataclass(frozen=True)
-class SmoothRegion:
-    """Map of the commands with labels and a smooth reference, and its data on the grid (pitches, heights)."""
-
-    map: FeasibleMap
-    jump: Array
-    """Largest joint move for one step: its quantile `gentle_share` over the arms [rad]."""
-
-
 def measure_labelled_region(plan: SamplePlan, dataset: Dataset) -> LabelledRegion:
     """Map of the commands that have labels. Raises ValueError if it is empty."""
     recipe = plan.recipe.feasible
@@ -48,8 +39,11 @@ def measure_labelled_region(plan: SamplePlan, dataset: Dataset) -> LabelledRegio
     return LabelledRegion(outline, held, share)
 
 
-def measure_smooth_region(plan: SamplePlan, held: FeasibleMap, network: ReferenceNetwork, arms: Array) -> SmoothRegion:
-    """Part of a map where the network moves smoothly, for arms (n, 14). Raises ValueError if it is empty."""
+def measure_smooth_region(
+    plan: SamplePlan, held: FeasibleMap, network: ReferenceNetwork, arms: Array
+) -> tuple[FeasibleMap, Array]:
+    """Part of a map where the network moves smoothly, and the largest joint move for one step at each command of the
+    grid (pitches, heights): its quantile `gentle_share` over arms (n, 14) [rad]. Raises ValueError if it is empty."""
     recipe, smooth = plan.recipe.feasible, plan.recipe.fit.smoothness
     arms = arms[np.linspace(0, len(arms) - 1, min(recipe.arms, len(arms))).astype(int)]
     jump = np.empty((len(plan.pitches), len(plan.heights)))
@@ -65,7 +59,7 @@ def measure_smooth_region(plan: SamplePlan, held: FeasibleMap, network: Referenc
             jump[row, column] = np.quantile(np.maximum(lower, leaner), recipe.gentle_share)
     height, pitch = np.meshgrid(plan.heights, plan.pitches)
     feasible = held.contains(height, pitch) & (jump <= recipe.jump)
-    return SmoothRegion(build_map(plan.pitches, plan.heights, feasible, recipe.bound_slope, plan.nominal), jump)
+    return build_map(plan.pitches, plan.heights, feasible, recipe.bound_slope, plan.nominal), jump
 
 
 def _around(plan: SamplePlan, command: Array) -> Array:

@@ -40,10 +40,9 @@ def run(job: Job) -> None:
     plan = SamplePlan(robot, rg, job.recipe.seed)
     learnt = prepared.training[dataset.index[prepared.training] < plan.drawn]
     try:
-        region = measure_smooth_region(plan, labelled, network, dataset.arm[learnt])
+        feasible, jump = measure_smooth_region(plan, labelled, network, dataset.arm[learnt])
     except ValueError as error:
         raise StageFailed(f"{error}; or raise rg.feasible.jump") from error
-    feasible = region.map
     feasible.save(job.out / "feasible.npz")
 
     held = prepared.held_out
@@ -57,7 +56,7 @@ def run(job: Job) -> None:
     figures = job.out / "figures"
     figures.mkdir(exist_ok=True)
     error_figures(figures, dataset.support[held], predicted, errors, jumps, rg.fit.gates, network.outputs)
-    gentle_figure(figures, plan, region, labelled)
+    gentle_figure(figures, plan, feasible, jump, labelled)
     learning_figure(figures, fitted.training_loss, fitted.validation_loss)
     if verdict.failures:
         raise StageFailed(

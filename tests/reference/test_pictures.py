@@ -52,8 +52,7 @@ def test_colours_and_outlines_say_what_they_are(drawn: dict[str, Figure]) -> Non
         heights=np.linspace(0.5, 0.8, 5),
         nominal=(0.0, 0.7),
     )
-    region: Any = SimpleNamespace(jump=np.full((4, 5), 0.02), map=held)
-    figures.gentle_figure(Path(), plan, region, held)  # type: ignore[arg-type]
+    figures.gentle_figure(Path(), plan, held, np.full((4, 5), 0.02), held)  # type: ignore[arg-type]
     axes, bar = drawn["feasible_map.png"].axes
     assert bar.get_ylabel() == "largest joint move for one step [rad]"
     assert legend(axes) == ["map of labelled commands", "feasible map"]

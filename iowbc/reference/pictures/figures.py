@@ -16,7 +16,7 @@ from iowbc.reference.fit.task_error import TaskErrors
 from iowbc.reference.labels.checks import MethodComparison
 from iowbc.reference.labels.dataset import Dataset
 from iowbc.reference.labels.plan import SamplePlan
-from iowbc.reference.region import LabelledRegion, SmoothRegion
+from iowbc.reference.region import LabelledRegion
 from iowbc.results.picture import write_figure
 
 INK, SOFT, WARM = "#1f3b57", "#8fb1cc", "#d1603d"
@@ -94,13 +94,13 @@ def error_figures(
     write_figure(figure, folder / "joints.png")
 
 
-def gentle_figure(folder: Path, plan: SamplePlan, region: SmoothRegion, held: FeasibleMap) -> None:
-    """The feasible map, and the largest joint move of the reference for one step of the command."""
+def gentle_figure(folder: Path, plan: SamplePlan, feasible: FeasibleMap, jump: Array, held: FeasibleMap) -> None:
+    """The feasible map, and the largest joint move of the reference for one step of the command, (pitches, heights)."""
     figure, (axes,) = _figure(1, 1, 6.0, 4.2)
-    shown = _on_grid(axes, plan, region.jump, "Blues_r", 2.0 * plan.recipe.feasible.jump)
+    shown = _on_grid(axes, plan, jump, "Blues_r", 2.0 * plan.recipe.feasible.jump)
     figure.colorbar(shown, ax=axes, label="largest joint move for one step [rad]", extend="max")
     _outline(axes, plan, held, "map of labelled commands", "--")
-    _outline(axes, plan, region.map, "feasible map")
+    _outline(axes, plan, feasible, "feasible map")
     axes.legend(loc="lower left")
     write_figure(figure, folder / "feasible_map.png")
 
