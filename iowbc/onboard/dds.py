@@ -20,13 +20,8 @@ from cyclonedds.util import duration
 
 from iowbc.errors import UsageError
 from iowbc.onboard import messages
-from iowbc.onboard.messages import Record, from_cdr, to_cdr
+from iowbc.onboard.messages import TOPICS, Record, from_cdr, to_cdr
 
-TOPICS = {
-    messages.LOW_COMMAND: "rt/lowcmd",
-    messages.LOW_STATE: "rt/lowstate",
-    messages.BATTERY_STATE: "rt/lf/bmsstate",
-}
 SWITCHER = "rt/api/motion_switcher/"
 """Service of the robot that starts and stops its own controllers."""
 CHECK_MODE = 1001

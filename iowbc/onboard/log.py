@@ -20,9 +20,8 @@ from iowbc.errors import Damaged, UsageError
 from iowbc.onboard import messages
 from iowbc.onboard.checks import SafetyLimits
 from iowbc.onboard.machine import CycleInputs, Machine, OperatorRequest, State
-from iowbc.onboard.messages import Record, from_cdr, to_cdr
+from iowbc.onboard.messages import LOW_COMMAND, LOW_STATE, TOPICS, Record, from_cdr, to_cdr
 
-TOPICS = {messages.LOW_STATE: "rt/lowstate", messages.LOW_COMMAND: "rt/lowcmd"}
 JSON_TOPICS = ("inputs", "event", "timing")
 ABOUT = "iowbc"
 """Name of the metadata that a replay needs."""
@@ -41,10 +40,10 @@ class LogWriter:
         self._writer.start(profile="iowbc", library="iowbc")
         self._writer.add_metadata(ABOUT, about)
         self._channels: dict[str, int] = {}
-        for kind, topic in TOPICS.items():
+        for kind in (LOW_STATE, LOW_COMMAND):
             name = f"unitree_hg/msg/dds_/{messages.NAMES[kind]}"
             schema = self._writer.register_schema(name, "omgidl", messages.idl(kind).encode())
-            self._channels[topic] = self._writer.register_channel(topic, "cdr", schema)
+            self._channels[TOPICS[kind]] = self._writer.register_channel(TOPICS[kind], "cdr", schema)
         for topic in JSON_TOPICS:
             schema = self._writer.register_schema(topic, "jsonschema", b'{"type": "object"}')
             self._channels[topic] = self._writer.register_channel(topic, "json", schema)
@@ -70,8 +69,8 @@ class LogWriter:
             charge=given.charge,
         )
         for state in given.states:
-            self._queue.put((TOPICS[messages.LOW_STATE], given.now, to_cdr(state)))
-        self._queue.put((TOPICS[messages.LOW_COMMAND], given.now, to_cdr(command)))
+            self._queue.put((TOPICS[LOW_STATE], given.now, to_cdr(state)))
+        self._queue.put((TOPICS[LOW_COMMAND], given.now, to_cdr(command)))
         return not self.failure
 
     def add(self, topic: str, at_time: float, **values: Any) -> None:
@@ -150,10 +149,10 @@ def read_cycles(path: Path) -> Iterator[tuple[CycleInputs, Record]]:
     for topic, _, data in read_messages(path):
         if topic == "inputs":
             inputs, states = json.loads(data), []
-        elif topic == TOPICS[messages.LOW_STATE]:
-            states.append(from_cdr(messages.LOW_STATE, data))
-        elif topic == TOPICS[messages.LOW_COMMAND] and inputs is not None:
-            yield _inputs(inputs, states), from_cdr(messages.LOW_COMMAND, data)
+        elif topic == TOPICS[LOW_STATE]:
+            states.append(from_cdr(LOW_STATE, data))
+        elif topic == TOPICS[LOW_COMMAND] and inputs is not None:
+            yield _inputs(inputs, states), from_cdr(LOW_COMMAND, data)
 
 
 def _inputs(logged: dict[str, Any], states: list[Record]) -> CycleInputs:

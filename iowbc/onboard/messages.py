@@ -60,6 +60,7 @@ NAMES = {
     BATTERY_STATE: "BmsState_",
 }
 """Names of the types in their IDL module."""
+TOPICS = {LOW_COMMAND: "rt/lowcmd", LOW_STATE: "rt/lowstate", BATTERY_STATE: "rt/lf/bmsstate"}
 HEADER = b"\x00\x01\x00\x00"
 """CDR header: little-endian, without options."""
 
