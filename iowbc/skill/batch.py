@@ -304,8 +304,8 @@ class GameBatch:
     def _write_figures(self, which: Indices, end: GameEnding) -> None:
         """Figures of the episodes that ended, (k,)."""
         drawn, simulation = self.drawn, self.lower.simulation
-        ends = ("success", "fallen", "dropped", "strayed", "diverged", "time_out")
-        values = self._figures.read(which, self.lower.period) | {name: getattr(end, name)[which] for name in ends}
+        ends = {name: happened[which] for name, happened in vars(end).items()}
+        values = self._figures.read(which, self.lower.period) | ends
         values |= {
             "touched": self._touched[which] / self._skill.frequency,
             "covered": self.now.covered[which],

@@ -47,9 +47,8 @@ def _along(
     settings: PathFollowing, paths: Paths, now: GameState, covered: Array, speed: Array, aside: Array
 ) -> ObjectMotion:
     heading = paths.heading(now.path, covered)
-    cosine, sine = np.cos(heading), np.sin(heading)
     return ObjectMotion(
-        velocity=np.stack([speed * cosine - aside * sine, speed * sine + aside * cosine], axis=1),
+        velocity=turned(np.stack([speed, aside], axis=1), heading),
         yaw_rate=paths.curvature(now.path, covered) * speed,
         heading=heading,
         height=paths.height(now.path, covered + settings.ahead),
