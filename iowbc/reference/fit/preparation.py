@@ -36,7 +36,7 @@ def prepare(
     dataset: Dataset, robot: Robot, recipe: ReferenceGenerator, seed: int, interrupted: Callable[[], bool]
 ) -> Prepared:
     """Splits by group and adds mirror images to the training part. Raises `Interrupted`."""
-    kinematics = TaskKinematics(SupportModel(robot, recipe.problem), recipe.height)
+    kinematics = TaskKinematics(SupportModel(robot, recipe.problem, recipe.height))
     samples = [Sample(*row) for row in zip(dataset.arm, dataset.command, strict=True)]
     orientation = np.roll(dataset.base_quaternion, -1, axis=1)
     configuration = np.concatenate([dataset.base_position, orientation, dataset.support], axis=1)

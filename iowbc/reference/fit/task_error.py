@@ -1,7 +1,7 @@
 """Errors of feet, height and torso of a support posture by forward kinematics, and their Jacobian."""
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import pinocchio
@@ -35,8 +35,8 @@ class TaskErrors:
 class TaskKinematics:
     """Places postures on the ground: mean position and mean orientation of the soles at the middle of the stance."""
 
-    def __init__(self, support: SupportModel, height: Literal["pelvis", "com"]) -> None:
-        self.support, self.height = support, height
+    def __init__(self, support: SupportModel) -> None:
+        self.support = support
         self.edges = support_edges(support.robot, support.problem)
 
     def errors(self, samples: list[Sample], postures: Array) -> TaskErrors:
@@ -59,7 +59,7 @@ class TaskKinematics:
         middle = pinocchio.SE3(rotation, 0.5 * (soles[0].translation + soles[1].translation))
         com, base, torso = map(middle.actInv, (centre, data.oMf[support.base], data.oMf[support.torso]))
         left = middle.actInv(soles[0]).translation - support.stance[0].translation
-        reached = com[2] if self.height == "com" else base.translation[2]
+        reached = com[2] if support.height == "com" else base.translation[2]
         turned = sample.torso_rotation().T @ torso.rotation
         foot, foot_rotation = np.linalg.norm(left), 0.5 * np.linalg.norm(pinocchio.log3(turn))
         margin = support_margin(self.edges, com[:2])
@@ -82,9 +82,9 @@ class TaskKinematics:
         places = [data.oMf[sole].translation for sole in support.soles]
         middle = 0.5 * (places[0] + places[1])
         turn, lift = -0.5 * (left[3:] + right[3:]), -0.5 * (left[2] + right[2])
-        centre = data.com[0] if self.height == "com" else data.oMf[support.base].translation
+        centre = data.com[0] if support.height == "com" else data.oMf[support.base].translation
         risen = lift - (pinocchio.skew(centre - middle) @ turn)[2]
-        if self.height == "com":
+        if support.height == "com":
             risen = risen + com_rows[2]
         foot = 0.5 * (left[:3] - right[:3]) - pinocchio.skew(places[0] - middle) @ turn
         rotation = 0.5 * (left[3:] - right[3:])

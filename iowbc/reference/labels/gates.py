@@ -1,7 +1,7 @@
 """Physical gates of a label, checked on the whole robot and independent of the labelling method."""
 
 from itertools import combinations
-from typing import Any, Literal
+from typing import Any
 
 import coal
 import numpy as np
@@ -20,8 +20,8 @@ from iowbc.robot.mjcf import Capsule
 class LabelChecker:
     """Holds the limits and buffers; one judge serves many labels."""
 
-    def __init__(self, support: SupportModel, gates: LabelGates, height: Literal["pelvis", "com"]) -> None:
-        self.support, self.gates, self.height = support, gates, height
+    def __init__(self, support: SupportModel, gates: LabelGates) -> None:
+        self.support, self.gates = support, gates
         robot, model = support.robot, support.full
         self.collision = SelfCollision(robot, model)
         self.edges = support_edges(robot, support.problem)
@@ -50,7 +50,7 @@ class LabelChecker:
         pinocchio.framesForwardKinematics(model, data, q)
         com = pinocchio.centerOfMass(model, data, q)
         errors = [place.actInv(data.oMf[sole]) for sole, place in zip(self.soles, support.stance, strict=True)]
-        height = float(com[2] if self.height == "com" else data.oMf[self.base].translation[2])
+        height = float(com[2] if support.height == "com" else data.oMf[self.base].translation[2])
         turned = pinocchio.log3(sample.torso_rotation().T @ data.oMf[self.torso].rotation)
         margin = float(support_margin(self.edges, com[:2]))
         moved = max(np.linalg.norm(one.translation) for one in errors)

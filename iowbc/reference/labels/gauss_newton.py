@@ -1,7 +1,6 @@
 """Gauss-Newton steps under constraints: linearised cost of a posture, a step, and a start from kinematics alone."""
 
 from dataclasses import dataclass
-from typing import Literal
 
 import daqp
 import numpy as np
@@ -57,16 +56,14 @@ class PostureCost:
     """(12, 21)."""
 
     @classmethod
-    def at(
-        cls, support: SupportModel, height: Literal["pelvis", "com"], q: Array, sample: Sample, rest: Array
-    ) -> "PostureCost":
+    def at(cls, support: SupportModel, q: Array, sample: Sample, rest: Array) -> "PostureCost":
         """The cost of configuration `q` (22,); `rest` (15,): reference of the posture cost."""
         model, data = support.model, support.data
         com_rows = pinocchio.jacobianCenterOfMass(model, data, q)
         pinocchio.updateFramePlacements(model, data)
         base = pinocchio.getFrameJacobian(model, data, support.base, pinocchio.LOCAL_WORLD_ALIGNED)
         torso = pinocchio.getFrameJacobian(model, data, support.torso, pinocchio.LOCAL)
-        com, of_com = data.com[0], height == "com"
+        com, of_com = data.com[0], support.height == "com"
         lift = com[2] if of_com else data.oMf[support.base].translation[2]
         turn = pinocchio.log3(sample.torso_rotation().T @ data.oMf[support.torso].rotation)
         angles = np.eye(len(rest), model.nv, 6)
@@ -88,7 +85,7 @@ def cost_weights(support: SupportModel) -> tuple[Array, Array]:
     return np.sqrt(task), np.sqrt(posture_weights(support.robot, problem))
 
 
-def kinematic_start(support: SupportModel, height: Literal["pelvis", "com"], sample: Sample) -> Array:
+def kinematic_start(support: SupportModel, sample: Sample) -> Array:
     """Configuration (22,) with the feet in place, the centre of mass over their middle, height and torso as commanded,
     near the default posture. The support model must be locked to the sample.
 
@@ -99,7 +96,7 @@ def kinematic_start(support: SupportModel, height: Literal["pelvis", "com"], sam
     q, largest = support.rest(sample), problem.largest_step
     rest = q[7:].copy()
     for _ in range(problem.iterations):
-        cost = PostureCost.at(support, height, q, sample, rest)
+        cost = PostureCost.at(support, q, sample, rest)
         gradient, residual = weight[:, None] * cost.gradient, weight * cost.residual
         lower, upper = np.maximum(support.lower - q[7:], -largest), np.minimum(support.upper - q[7:], largest)
         step = constrained_step(gradient, residual, cost.equality, cost.error, cost.gradient[6:], lower, upper)

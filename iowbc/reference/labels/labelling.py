@@ -36,14 +36,14 @@ class Labeller:
     def __init__(self, task: LabelTask) -> None:
         robot, recipe = load_robot(task.robot), task.recipe
         self.draw = SamplePlan(robot, recipe, task.seed).draw
-        support = SupportModel(robot, recipe.problem)
-        self.judge = LabelChecker(support, recipe.gates, recipe.height)
+        support = SupportModel(robot, recipe.problem, recipe.height)
+        self.judge = LabelChecker(support, recipe.gates)
         if task.method == "ocp":  # crocoddyl is loaded only where it is used
             from iowbc.reference.labels.optimal_control import OptimalControlMethod
 
             self.method: StaticMethod | OptimalControlMethod = OptimalControlMethod(support, recipe)
         else:
-            self.method = StaticMethod(support, recipe.height)
+            self.method = StaticMethod(support)
 
     def solve(self, index: int, sample: Sample) -> dict[str, Array]:
         """A label that passed every gate, as arrays named as in the dataset. Raises `Rejected`."""

@@ -29,7 +29,7 @@ class OptimalControlMethod:
     """Solves samples one after the other; a label does not depend on the samples before it."""
 
     def __init__(self, support: SupportModel, recipe: ReferenceGenerator) -> None:
-        self.support, self.recipe, self.problem, self.ocp = support, recipe, recipe.problem, recipe.ocp
+        self.support, self.problem, self.ocp = support, recipe.problem, recipe.ocp
         self.state = crocoddyl.StateMultibody(support.model)
         self.actuation = crocoddyl.ActuationModelFloatingBase(self.state)
         self.posture = posture_weights(support.robot, recipe.problem)
@@ -48,7 +48,7 @@ class OptimalControlMethod:
 
     def trajectory(self, sample: Sample) -> list[Array]:
         """States (configuration, velocity) at the nodes. The support model must be locked to the sample."""
-        posture = kinematic_start(self.support, self.recipe.height, sample)
+        posture = kinematic_start(self.support, sample)
         start = np.concatenate([posture, np.zeros(self.support.model.nv)])
         contacts = self._contacts()
         running = self._action(self._costs(sample, terminal=False), contacts, self.ocp.step)
@@ -94,7 +94,7 @@ class OptimalControlMethod:
             barrier = crocoddyl.ActivationModelQuadraticBarrier(crocoddyl.ActivationBounds(lower, upper))
             costs.addCost(name, crocoddyl.CostModelResidual(state, barrier, residual), weight)
 
-        of_com = self.recipe.height == "com"
+        of_com = support.height == "com"
         com_height, base_height = (problem.height_weight, 0.0) if of_com else (0.0, problem.height_weight)
         place = np.array([0.0, 0.0, sample.height])
         plane = np.array([problem.com_weight, problem.com_weight, com_height])

@@ -4,8 +4,6 @@ Variables are the base pose, the support joints and the two sole wrenches; Gauss
 base's equilibrium as linearised equalities, and joint, torque and contact limits as inequalities.
 """
 
-from typing import Literal
-
 import numpy as np
 import pinocchio
 
@@ -21,8 +19,8 @@ from iowbc.robot.description import GRAVITY
 class StaticMethod:
     """Solves samples one after the other; holds the model and its buffers."""
 
-    def __init__(self, support: SupportModel, height: Literal["pelvis", "com"]) -> None:
-        self.support, self.height, self.problem = support, height, support.problem
+    def __init__(self, support: SupportModel) -> None:
+        self.support, self.problem = support, support.problem
         self.joints, self.velocities = len(support.robot.support), support.model.nv
         self.size = self.velocities + 12
         self.start = support.start()
@@ -58,7 +56,7 @@ class StaticMethod:
         forces = ground_forces(support.model, support.soles, wrench)
         by_position = pinocchio.computeStaticTorqueDerivatives(support.model, support.data, q, forces)
         static = support.data.tau.copy()
-        cost = PostureCost.at(support, self.height, q, sample, rest)
+        cost = PostureCost.at(support, q, sample, rest)
         soles = cost.equality
         by_wrench = np.concatenate([-soles[:6].T, -soles[6:].T], axis=1)  # of base and joint torques, (21, 12)
         equality = np.zeros((18, self.size))

@@ -1,6 +1,6 @@
 """The robot in pinocchio, with its arms locked to a sample."""
 
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pinocchio
@@ -43,8 +43,9 @@ def build_model(robot: Robot) -> Any:
 class SupportModel:
     """Base and support joints in the robot's order; `lock` adds the arms' inertia."""
 
-    def __init__(self, robot: Robot, problem: PostureProblem) -> None:
-        self.robot, self.problem = robot, problem
+    def __init__(self, robot: Robot, problem: PostureProblem, height: Literal["pelvis", "com"] = "pelvis") -> None:
+        """`height`: that of the pelvis or of the centre of mass, as a sample commands it."""
+        self.robot, self.problem, self.height = robot, problem, height
         self.full = build_model(robot)
         self.full_data = self.full.createData()
         self._arms = [self.full.getJointId(robot.joints[index]) for index in robot.interaction]

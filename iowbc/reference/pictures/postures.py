@@ -34,8 +34,8 @@ def draw_strip(path: Path, plan: SamplePlan) -> None:
     robot, recipe = plan.robot, plan.recipe
     heights = np.interp((np.arange(HEIGHTS)[::-1] + 0.5) / HEIGHTS, [0.0, 1.0], plan.heights[[0, -1]])
     places = np.linspace(0, len(plan.pitches) - 1, PITCHES).round().astype(int)
-    support, model = SupportModel(robot, recipe.problem), _scene(robot)
-    method, judge = StaticMethod(support, recipe.height), LabelChecker(support, recipe.gates, recipe.height)
+    support, model = SupportModel(robot, recipe.problem, recipe.height), _scene(robot)
+    method, judge = StaticMethod(support), LabelChecker(support, recipe.gates)
     figure = Figure(figsize=(1.75 * PITCHES, 1.85 * HEIGHTS), layout="constrained")
     axes = figure.subplots(HEIGHTS, PITCHES)
     with Offscreen(

@@ -88,14 +88,14 @@ def test_too_few_samples_to_split_are_named() -> None:
 
 @pytest.fixture(scope="module")
 def kinematics(support: SupportModel) -> TaskKinematics:
-    return TaskKinematics(support, "pelvis")
+    return TaskKinematics(support)
 
 
 def test_a_label_has_no_task_error(
     support: SupportModel, kinematics: TaskKinematics, command: Callable[..., Sample]
 ) -> None:
     sample = command(0.62, 0.45)
-    errors = kinematics.errors([sample], StaticMethod(support, "pelvis").solve(sample).support[None])
+    errors = kinematics.errors([sample], StaticMethod(support).solve(sample).support[None])
     assert abs(errors.height[0]) < 2e-3
     assert abs(errors.pitch[0]) < 5e-3
     assert errors.foot[0] < 1e-4
@@ -107,7 +107,7 @@ def test_a_longer_leg_lifts_spreads_and_tilts(
     robot: Any, support: SupportModel, kinematics: TaskKinematics, command: Callable[..., Sample]
 ) -> None:
     sample = command(0.62, 0.2)
-    posture = StaticMethod(support, "pelvis").solve(sample).support
+    posture = StaticMethod(support).solve(sample).support
     names = [robot.joints[index] for index in robot.support]
     both = posture.copy()
     for side in ("left", "right"):  # both knees stretch, hips and ankles keep soles and trunk level
@@ -127,7 +127,7 @@ def test_the_task_jacobian_is_the_derivative(
     support: SupportModel, kinematics: TaskKinematics, command: Callable[..., Sample]
 ) -> None:
     sample = command(0.62, 0.3)
-    label = StaticMethod(support, "pelvis").solve(sample)
+    label = StaticMethod(support).solve(sample)
     jacobian = kinematics.jacobian(sample, label.configuration)
     step, random = 1e-5, np.random.default_rng(0)
     for _ in range(10):
@@ -195,8 +195,8 @@ def test_the_margin_gate_looks_at_the_low_end(dataset_job: Job) -> None:
 def test_predictions_are_placed_on_both_soles(support: SupportModel, command: Callable[..., Sample]) -> None:
     """A rigid motion of the whole robot changes nothing: only joints enter."""
     sample = command(0.66, 0.1)
-    label = StaticMethod(support, "pelvis").solve(sample)
+    label = StaticMethod(support).solve(sample)
     com = pinocchio.centerOfMass(support.model, support.data, label.configuration)
-    margin = TaskKinematics(support, "pelvis").errors([sample], label.support[None]).margin[0]
+    margin = TaskKinematics(support).errors([sample], label.support[None]).margin[0]
     assert margin == pytest.approx(0.0, abs=0.2)
     assert np.abs(com[:2]).max() < 0.01

@@ -22,12 +22,12 @@ def sample(command: Callable[..., Sample]) -> Sample:
 
 @pytest.fixture
 def label(support: SupportModel, sample: Sample) -> Posture:
-    return StaticMethod(support, "pelvis").solve(sample)
+    return StaticMethod(support).solve(sample)
 
 
 @pytest.fixture(scope="module")
 def judge(support: SupportModel) -> LabelChecker:
-    return LabelChecker(support, LabelGates(), "pelvis")
+    return LabelChecker(support, LabelGates())
 
 
 def moved(support: SupportModel, posture: Posture, **tangent: float) -> Posture:
@@ -98,11 +98,11 @@ def test_a_heavy_load_fails_the_torque_gate(
     weak = SupportModel(support.robot, recipe.problem.model_copy(update={"effort_fraction": 0.05}))
     weak.lock(sample)
     with pytest.raises(Rejected, match="torque"):
-        LabelChecker(weak, LabelGates(), "pelvis").label(sample, label)
+        LabelChecker(weak, LabelGates()).label(sample, label)
 
 
 def test_a_small_support_margin_is_rejected(support: SupportModel, sample: Sample, label: Posture) -> None:
-    strict = LabelChecker(support, LabelGates(support_margin=0.2), "pelvis")
+    strict = LabelChecker(support, LabelGates(support_margin=0.2))
     with pytest.raises(Rejected, match="support margin"):
         strict.label(sample, label)
 

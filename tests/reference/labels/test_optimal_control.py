@@ -32,7 +32,7 @@ def method(support: SupportModel, recipe: ReferenceGenerator) -> OptimalControlM
 def test_mid_horizon_postures_equal_static_labels(
     method: OptimalControlMethod, support: SupportModel, command: Callable[..., Sample]
 ) -> None:
-    static = StaticMethod(support, "pelvis")
+    static = StaticMethod(support)
     for height, pitch in COMMANDS:
         sample = command(height, pitch)
         np.testing.assert_allclose(method.solve(sample).support, static.solve(sample).support, atol=0.02)
@@ -43,14 +43,14 @@ def test_its_waist_takes_the_lean_as_that_of_static_labels_does(robot: Robot, co
     support = SupportModel(robot, recipe.problem)
     sample = command(0.66, 0.35)
     solved = OptimalControlMethod(support, recipe).solve(sample).support
-    np.testing.assert_allclose(solved, StaticMethod(support, "pelvis").solve(sample).support, atol=0.02)
+    np.testing.assert_allclose(solved, StaticMethod(support).solve(sample).support, atol=0.02)
     assert solved[robot.waist_pitch].sum() > 0.3
 
 
 def test_its_postures_pass_the_physical_gates(
     method: OptimalControlMethod, support: SupportModel, command: Callable[..., Sample]
 ) -> None:
-    judge = LabelChecker(support, LabelGates(), "pelvis")
+    judge = LabelChecker(support, LabelGates())
     for height, pitch in COMMANDS:
         sample = command(height, pitch)
         judge.label(sample, method.solve(sample))
@@ -86,7 +86,7 @@ def test_the_kinematic_start_stands_as_commanded(support: SupportModel, command:
     for height, pitch in COMMANDS:
         sample = command(height, pitch)
         support.lock(sample)
-        q = kinematic_start(support, "pelvis", sample)
+        q = kinematic_start(support, sample)
         com = pinocchio.centerOfMass(support.model, support.data, q).copy()
         pinocchio.framesForwardKinematics(support.model, support.data, q)
         for sole, place in zip(support.soles, support.stance, strict=True):
@@ -98,7 +98,7 @@ def test_the_kinematic_start_stands_as_commanded(support: SupportModel, command:
 def test_wrenches_are_distributed_as_in_the_static_optimum(
     robot: Robot, support: SupportModel, recipe: ReferenceGenerator, command: Callable[..., Sample]
 ) -> None:
-    label = StaticMethod(support, "pelvis").solve(command(0.64, 0.4))
+    label = StaticMethod(support).solve(command(0.64, 0.4))
     wrench = distribute(support, label.configuration, sole_limits(robot, recipe.problem))
     np.testing.assert_allclose(wrench, label.wrench, atol=0.5)
 

@@ -23,7 +23,7 @@ LABELS = 40
 
 @pytest.fixture(scope="module")
 def method(support: SupportModel) -> StaticMethod:
-    return StaticMethod(support, "pelvis")
+    return StaticMethod(support)
 
 
 def sole_forces(model: Any, data: Any, robot: Robot, wrench: Any) -> Any:
@@ -71,7 +71,8 @@ def test_feet_height_and_torso_are_where_they_were_asked(
 def test_the_com_height_reading_puts_the_centre_of_mass_there(
     support: SupportModel, command: Callable[..., Sample]
 ) -> None:
-    posture = StaticMethod(support, "com").solve(command(0.6, 0.1))
+    support = SupportModel(support.robot, support.problem, "com")
+    posture = StaticMethod(support).solve(command(0.6, 0.1))
     com = pinocchio.centerOfMass(support.model, support.data, posture.configuration)
     assert com[2] == pytest.approx(0.6, abs=2e-3)
 
@@ -138,7 +139,7 @@ def test_no_neighbour_that_is_in_equilibrium_costs_less(
 def test_a_waist_that_takes_the_lean_keeps_the_pelvis_level_as_far_as_it_turns(
     robot: Robot, command: Callable[..., Sample]
 ) -> None:
-    method = StaticMethod(SupportModel(robot, PostureProblem(waist_share=1.0)), "pelvis")
+    method = StaticMethod(SupportModel(robot, PostureProblem(waist_share=1.0)))
     upright = method.solve(command(0.66, 0.0)).support
     for pitch in (-0.3, 0.2, 0.4):
         bent = method.solve(command(0.66, pitch)).support
@@ -156,6 +157,6 @@ def test_what_cannot_be_reached_is_rejected(method: StaticMethod, command: Calla
 def test_the_label_does_not_depend_on_what_was_solved_before(
     method: StaticMethod, support: SupportModel, recipe: ReferenceGenerator, command: Callable[..., Sample]
 ) -> None:
-    fresh = StaticMethod(SupportModel(support.robot, recipe.problem), "pelvis").solve(command(0.6, 0.5))
+    fresh = StaticMethod(SupportModel(support.robot, recipe.problem)).solve(command(0.6, 0.5))
     method.solve(command(0.72, -0.2))
     np.testing.assert_array_equal(method.solve(command(0.6, 0.5)).configuration, fresh.configuration)
