@@ -1,7 +1,7 @@
 """Contract of an exported policy: all that a caller on the robot must know, as JSON beside the graph."""
 
 import math
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
@@ -201,8 +201,13 @@ def meanings(section: type[Section], path: str = "") -> dict[str, str]:
 def seal(contract: Contract, folder: Path) -> Contract:
     """Write `contract.json` with the digest of every file now in the folder."""
     files = sorted(path for path in folder.rglob("*") if path.is_file() and path != folder / CONTRACT)
-    sealed = contract.model_copy(update={"files": {str(path.relative_to(folder)): file_digest(path) for path in files}})
-    (folder / CONTRACT).write_text(sealed.model_dump_json(indent=1) + "\n", encoding="utf-8")
+    return write_sealed(contract, folder / CONTRACT, [str(path.relative_to(folder)) for path in files])
+
+
+def write_sealed(contract: Kind, path: Path, files: Iterable[str]) -> Kind:
+    """Write a contract to a file, with the digests of other files of its folder."""
+    sealed = contract.model_copy(update={"files": {name: file_digest(path.parent / name) for name in files}})
+    path.write_text(sealed.model_dump_json(indent=1) + "\n", encoding="utf-8")
     return sealed
 
 

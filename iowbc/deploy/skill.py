@@ -25,7 +25,6 @@ from iowbc.deploy.contract import parsed, readable, require_sealed, require_unch
 from iowbc.deploy.controller import Controller, base_grasp, open_session, run
 from iowbc.deploy.plausibility import WIDE, Plausibility
 from iowbc.errors import ContractBroken
-from iowbc.files import file_digest
 from iowbc.recipe.section import Section
 from iowbc.recipe.skill.skill import RobotAgent
 from iowbc.recipe.task.commands import Commands
@@ -60,12 +59,6 @@ class SkillContract(Section):
     def problems(self) -> Iterator[tuple[str, str]]:
         if self.observation != (size := SENSED + 6 * self.robot.history):
             yield "", f"observation: {self.observation}, with robot.history {self.robot.history} it is {size}"
-
-
-def seal_skill(contract: SkillContract, folder: Path) -> None:
-    """Write the contract with the digests of the files that the folder holds now."""
-    sealed = contract.model_copy(update={"files": {name: file_digest(folder / name) for name in FILES}})
-    (folder / CONTRACT).write_text(sealed.model_dump_json(indent=1) + "\n", encoding="utf-8")
 
 
 def read_skill_contract(folder: Path) -> SkillContract:

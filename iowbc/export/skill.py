@@ -9,9 +9,9 @@ from torch import Tensor
 
 from iowbc.arrays import Array
 from iowbc.control.command import COMMAND
-from iowbc.deploy.contract import PortEntry
+from iowbc.deploy.contract import PortEntry, write_sealed
 from iowbc.deploy.controller import open_session, run
-from iowbc.deploy.skill import GOLDEN, GRAPH, SkillContract, seal_skill
+from iowbc.deploy.skill import CONTRACT, FILES, GOLDEN, GRAPH, SkillContract
 from iowbc.export.folder import PACKAGES
 from iowbc.export.golden import largest_difference, write_golden
 from iowbc.export.graph import Program
@@ -58,5 +58,5 @@ def write_skill(
     inputs = {"observation": np.ascontiguousarray(observations, np.float32)}
     expected = run_torch(program, inputs)
     write_golden(inputs, expected, out / GOLDEN)
-    seal_skill(contract, out)
+    write_sealed(contract, out / CONTRACT, FILES)
     return max(largest_difference(expected, run(open_session(out / GRAPH), inputs)).values())
