@@ -15,7 +15,9 @@ DAMPING = 0.002
 class HandForces:
     """Estimates forces of the object on the hands, of n robots, from means over a decision."""
 
-    def __init__(self, robot: Robot, references: ReferenceLayer, n: int) -> None:
+    def __init__(self, robot: Robot, references: ReferenceLayer, n: int, history: int) -> None:
+        self.felt = np.zeros((n, history, 2, 3))
+        """Forces on left and right hand in the last decisions, the newest last, heading frame [N]."""
         self._robot, self._arms, self._gravity = robot, references.arms, ArmGravity(robot)
         self._sum = np.zeros((3, n, len(robot.joints)))
         self._count = 0
@@ -25,9 +27,9 @@ class HandForces:
         self._sum += np.stack([target, position, velocity])
         self._count += 1
 
-    def read(self, gravity: Array) -> tuple[Array, Array]:
-        """Forces (n, 2, 3) [N] on left and right hand in the heading frame, and wrist positions (n, 2, 3) [m] in the
-        torso frame; then restarts the means. `gravity` (n, 3): measured direction in the base frame.
+    def read(self, gravity: Array) -> Array:
+        """Adds the forces of a decision to `felt` and restarts the means; wrist positions (n, 2, 3) [m] in the torso
+        frame. `gravity` (n, 3): measured direction in the base frame.
 
         Without acceleration τ = g(q) - Jᵀ F, hence F = (J Jᵀ + λ)⁻¹ J (g - τ) with τ = kp (target - q) - kd q̇.
         """
@@ -44,4 +46,5 @@ class HandForces:
         pitch = np.arcsin(gravity[:, 0].clip(-1.0, 1.0))
         roll = np.arctan2(-gravity[:, 1], -gravity[:, 2])
         torso, _ = self._arms.torso_in_heading(waist, pitch, roll)
-        return force @ torso.swapaxes(1, 2), wrists
+        self.felt = np.concatenate([self.felt[:, 1:], (force @ torso.swapaxes(1, 2))[:, None]], axis=1)
+        return wrists

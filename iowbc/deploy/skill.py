@@ -115,8 +115,7 @@ class Skill:
 
     def reset(self) -> None:
         n = self._controller.robots
-        self._hands = HandForces(self._controller.robot, self._references, n)
-        self._felt = np.zeros((n, self.contract.robot.history, 2, 3))
+        self._hands = HandForces(self._controller.robot, self._references, n, self.contract.robot.history)
         self._wrist_error = np.zeros((n, 2, 3))
         self._passed = 0
         self._yaw: Array | None = None
@@ -131,7 +130,7 @@ class Skill:
         measured = self._plausible(measured)
         if self._yaw is not None:
             action = run(self._session, {"observation": self.observation})["action"]
-            nominal = self._rule.following(self._felt[:, -1].sum(axis=1), self._yaw)
+            nominal = self._rule.following(self._hands.felt[:, -1].sum(axis=1), self._yaw)
             decided = self._rule.with_action(nominal, action)
             whole: Mask = np.asarray(np.isfinite(decided).all(axis=1))[:, None]
             self._command = np.where(whole, decided, self._command)
@@ -159,13 +158,12 @@ class Skill:
         if self._passed:
             state = self._controller.state
             posture, last = (state[name].astype(np.float64) for name in ("posture", "command"))
-            force, wrists = self._hands.read(measured.projected_gravity)
-            self._felt = np.concatenate([self._felt[:, 1:], force[:, None]], axis=1)
+            wrists = self._hands.read(measured.projected_gravity)
             self._wrist_error = wrists - self._references.wrist_target(posture, last, self._grasp)
             command = approach(last, command, self._largest_step)
         n = len(command)
         unknown, no_path = np.zeros(n, np.bool_), np.zeros((n, WAYPOINTS))
         self.observation = robot_observation(
-            command, measured, self._wrist_error, thing, self._pushing, unknown, no_path, self._felt
+            command, measured, self._wrist_error, thing, self._pushing, unknown, no_path, self._hands.felt
         )
         return thing[:, YAW]

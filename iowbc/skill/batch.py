@@ -126,14 +126,12 @@ class GameBatch:
         self.drawn = EpisodeDraws(setup.tasks, scenes, setup.partners, self._skill.goal_known, plans)
         self._nominal = NominalCommand(self._skill, recipe.task.commands, self._pushing)
         self._human = Human(self._skill, n, period)
-        self._hands = HandForces(self.lower.robot, self.lower.guidance.references, n)
+        self._hands = HandForces(self.lower.robot, self.lower.guidance.references, n, self._skill.robot.history)
         self._figures = EpisodeFigures(n, (int(self._limit.max()) + 1) * self.substeps)
         self._sees_object = recipe.task.observation.observe_object and recipe.distill.observe_object
         self.origin = Origin(np.zeros((n, 3)), np.zeros(n))
         self._episode, self._decisions, self._touched = np.zeros((3, n), np.int64)
         self._total, self._potential = np.zeros((2, n))
-        self._felt = np.zeros((n, self._skill.robot.history, 2, 3))
-        """Estimated forces on the hands, the newest last [N]."""
         self._wrist_error = np.zeros((n, 2, 3))
         self._action = {"robot": np.zeros((n, ROBOT_ACTIONS)), "human": np.zeros((n, HUMAN_ACTIONS))}
         self._costs, self._jerk = np.zeros((3, n)), np.zeros(n)
@@ -191,8 +189,7 @@ class GameBatch:
         """Reward and endings of the decision; restarts ended games."""
         self._decisions += 1
         lower, buffers, held = self.lower, self.buffers, ~self._pushing
-        force, wrists = self._hands.read(lower.simulation.measured.projected_gravity)
-        self._felt = np.concatenate([self._felt[:, 1:], force[:, None]], axis=1)
+        wrists = self._hands.read(lower.simulation.measured.projected_gravity)
         memory, guidance = lower.memory, lower.guidance
         target = guidance.references.wrist_target(memory.posture, memory.command, guidance.grasp)
         self._wrist_error = wrists - target
@@ -230,7 +227,7 @@ class GameBatch:
         self._potential[which] = potential(self._skill, self.now, ~self._pushing)[which]
         self._human.start(which)
         self._figures.start(which)
-        for values in (self._decisions, self._touched, self._total, self._felt, self._wrist_error):
+        for values in (self._decisions, self._touched, self._total, self._hands.felt, self._wrist_error):
             values[which] = 0
         for action in self._action.values():
             action[which] = 0.0
@@ -245,7 +242,7 @@ class GameBatch:
         nominal = self._nominal
         by_rule = {
             "lead": nominal.leading(pursue(self._skill.pursuit, self.paths, self.now), self.now),
-            "follow": nominal.following(self._felt[:, -1].sum(axis=1), yaw),
+            "follow": nominal.following(self._hands.felt[:, -1].sum(axis=1), yaw),
             "clock": nominal.leading(self._open_loop_motion(1.0), self.now),
             "stand": nominal.standing(),
         }
@@ -290,7 +287,7 @@ class GameBatch:
         thing = of_object(lower.simulation.measured, self._sees_object)
         robot = robot_observation(
             *(lower.memory.command, lower.simulation.measured, self._wrist_error, thing),
-            *(self._pushing, drawn.known, path, self._felt),
+            *(self._pushing, drawn.known, path, self._hands.felt),
         )
         force = self.origin.turned(lower.simulation.state.partner_force)
         felt = seen.human_observation(now, force, self._action["human"], human_path)
