@@ -111,7 +111,7 @@ def learning_figure(folder: Path, training: Sequence[float], validation: Sequenc
     axes.semilogy(epochs, training, color=SOFT, label="training")
     axes.semilogy(epochs, validation, color=INK, label="validation")
     axes.set(xlabel="epoch", ylabel="loss [rad²]")
-    axes.legend(frameon=False)
+    axes.legend(frameon=False, loc="upper right")
     write_figure(figure, folder / "learning.png")
 
 
@@ -174,7 +174,7 @@ def histogram(
         limit *= factor
         low, high = min(low, limit), max(high, limit)
         axes.axvline(limit, color=WARM, linestyle="--", label=meaning)
-        axes.legend(fontsize="small")
+        axes.legend(fontsize="small", loc="upper right")
     bins = min(BINS, max(FEWEST_BINS, len(values) // 4))
     drawn, _, _ = axes.hist(values, np.linspace(low, high + 1e-9, bins), color=SOFT, edgecolor=INK, linewidth=0.3)
     if beyond := len(values) - int(drawn.sum()):
