@@ -10,8 +10,7 @@ from iowbc.errors import Damaged, Problem, RecipeError, shown
 from iowbc.pipeline.code import changed_code, stage_code
 from iowbc.pipeline.nested import MISSING, differences, nested
 from iowbc.pipeline.stage import ExternalInput, Stage, slice_value
-from iowbc.pipeline.stage_plan import Options, StagePlan
-from iowbc.pipeline.stage_time import estimated
+from iowbc.pipeline.stage_plan import Options, StagePlan, estimated
 from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.digests import data_digest, folder_digest
 from iowbc.pipeline.store.runs import read_record
