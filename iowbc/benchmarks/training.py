@@ -12,8 +12,8 @@ from stable_baselines3.common.vec_env import SubprocVecEnv, VecNormalize
 
 from iowbc.benchmarks.standing_generator import benchmark_world
 from iowbc.control.action import action_mirror
-from iowbc.learning.activations import ACTIVATIONS
 from iowbc.learning.computing import prepare_process
+from iowbc.learning.perceptron import ACTIVATIONS
 from iowbc.learning.teacher import TeacherTraining
 from iowbc.processes import available_cores
 from iowbc.recipe.recipe import Recipe

@@ -5,11 +5,10 @@ import torch
 from torch import Tensor, nn
 
 from iowbc.arrays import Array
-from iowbc.learning.activations import ACTIVATIONS
 from iowbc.learning.encoders import MirroredEncoder
 from iowbc.learning.history_actor import HistoryActor
 from iowbc.learning.networks import Normalizer, StudentNetwork, TeacherNetwork
-from iowbc.learning.perceptron import DenseMlp
+from iowbc.learning.perceptron import ACTIVATIONS, DenseMlp
 from iowbc.learning.policy import ActorCritic
 from iowbc.learning.symmetric import SymmetricHead, SymmetricMlp
 from iowbc.rollouts.policies import HistoryEncoder, HistoryPolicy, Layers, Linear, Normal, RowPolicy

@@ -5,7 +5,7 @@ from typing import cast
 import torch
 from torch import Tensor, nn
 
-from iowbc.learning.activations import ACTIVATIONS
+from iowbc.learning.perceptron import ACTIVATIONS
 from iowbc.learning.symmetric import SymmetricHead
 from iowbc.robot.mirror import MirrorMap
 

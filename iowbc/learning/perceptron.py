@@ -1,16 +1,34 @@
-"""Multilayer perceptrons, split into the parts that a learner calls."""
+"""Multilayer perceptrons, split into the parts that a learner calls, and their activations."""
 
 import itertools
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import torch
 from torch import Tensor, nn
 
-from iowbc.learning.activations import ACTIVATIONS
+aten = torch.ops.aten
 
 Hidden = tuple[Tensor, ...]
 """The last hidden layer, in one part or in several."""
+
+
+class Activation(NamedTuple):
+    """An activation whose derivative follows from its value."""
+
+    module: type[nn.Module]
+    function: Callable[[Tensor], Tensor]
+    backward: Callable[[Tensor, Tensor], Tensor]
+    """Gradient at the input, from the gradient at the output and the output value."""
+
+
+ACTIVATIONS = {
+    "elu": Activation(nn.ELU, nn.functional.elu, lambda grad, y: aten.elu_backward(grad, 1, 1, 1, True, y)),
+    "relu": Activation(nn.ReLU, torch.relu, lambda grad, y: aten.threshold_backward(grad, y, 0)),
+    "tanh": Activation(nn.Tanh, torch.tanh, lambda grad, y: aten.tanh_backward(grad, y)),
+}
+"""Activations by their name in a recipe."""
 
 
 class Perceptron(nn.Module, ABC):

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 import torch
 from torch import Tensor, nn
+from torch.autograd import Function
 
-from iowbc.learning.activations import PairedActivation
-from iowbc.learning.perceptron import Hidden, VectorPerceptron
+from iowbc.learning.perceptron import ACTIVATIONS, Activation, Hidden, VectorPerceptron
 from iowbc.robot.mirror import MirrorMap
 
 Parts = tuple[Tensor, Tensor]
@@ -63,6 +63,42 @@ def _eigenvectors(mirror: MirrorMap) -> tuple[list[Any], list[Any]]:
             even.append((unit[place] + sign[place] * unit[other]) / np.sqrt(2.0))
             odd.append((unit[place] - sign[place] * unit[other]) / np.sqrt(2.0))
     return even, odd
+
+
+class PairedActivation(nn.Module):
+    """Activation of unit pairs (a, b). Inputs are (a + b) / 2 and (a - b) / 2, outputs a' + b' and a' - b'.
+
+    Mirroring swaps a and b: the first output stays, the second changes sign, whatever the activation.
+    """
+
+    def __init__(self, name: str) -> None:
+        super().__init__()
+        self.activation = ACTIVATIONS[name]
+
+    def forward(self, even: Tensor, odd: Tensor) -> tuple[Tensor, Tensor]:
+        if even.requires_grad:
+            sums, differences = _Paired.apply(even, odd, self.activation)  # type: ignore[no-untyped-call]
+            return sums, differences
+        one, other = self.activation.function(even + odd), self.activation.function(even - odd)
+        return one + other, one - other
+
+
+class _Paired(Function):
+    """`PairedActivation` with a backward pass of half the steps and memory of torch's automatic one."""
+
+    @staticmethod
+    def forward(ctx: Any, even: Tensor, odd: Tensor, activation: Activation) -> tuple[Tensor, Tensor]:
+        one, other = activation.function(even + odd), activation.function(even - odd)
+        ctx.save_for_backward(one, other)
+        ctx.activation = activation
+        return one + other, one - other
+
+    @staticmethod
+    def backward(ctx: Any, sums: Tensor, differences: Tensor) -> tuple[Tensor, Tensor, None]:
+        one, other = ctx.saved_tensors
+        first = ctx.activation.backward(sums + differences, one)
+        second = ctx.activation.backward(sums - differences, other)
+        return first + second, first.sub_(second), None
 
 
 class SymmetricLayers(nn.Module):

@@ -8,11 +8,11 @@ import torch
 from gymnasium import spaces
 from mirrored import mirror_tensor
 
-from iowbc.learning.activations import ACTIVATIONS, PairedActivation
 from iowbc.learning.networks import SymmetricMlp, TeacherNetwork, mirror_as_json
 from iowbc.learning.normalization import SymmetricMeanStd
+from iowbc.learning.perceptron import ACTIVATIONS
 from iowbc.learning.policy import ActorCritic
-from iowbc.learning.symmetric import MirrorBasis, SymmetricLayers
+from iowbc.learning.symmetric import MirrorBasis, PairedActivation, SymmetricLayers
 from iowbc.robot.mirror import MirrorMap
 
 OBSERVATION = MirrorMap(np.array([1, 0, 2, 3, 5, 4]), np.array([1, 1, -1, 1, -1, -1], np.float32))
