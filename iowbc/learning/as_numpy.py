@@ -5,9 +5,8 @@ import torch
 from torch import Tensor, nn
 
 from iowbc.arrays import Array
-from iowbc.learning.encoders import MirroredEncoder
 from iowbc.learning.history_actor import HistoryActor
-from iowbc.learning.networks import Normalizer, StudentNetwork, TeacherNetwork
+from iowbc.learning.networks import MirroredEncoder, Normalizer, StudentNetwork, TeacherNetwork
 from iowbc.learning.perceptron import ACTIVATIONS, DenseMlp
 from iowbc.learning.policy import ActorCritic
 from iowbc.learning.symmetric import SymmetricHead, SymmetricMlp
