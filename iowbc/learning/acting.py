@@ -13,8 +13,8 @@ from iowbc.errors import Damaged
 from iowbc.files import previous, read_checked
 from iowbc.learning.checkpoint import under
 from iowbc.learning.networks import Mirrors, StudentNetwork, TeacherNetwork
+from iowbc.learning.policy import trained_network
 from iowbc.learning.storage import Network, load_network, require_layout
-from iowbc.learning.trained import trained_network
 from iowbc.recipe.teacher import Teacher
 from iowbc.rollouts.policies import History
 

@@ -15,9 +15,9 @@ from iowbc.learning.best import Best, acting_part, averaged
 from iowbc.learning.checkpoint import Arrays, prefixed, under
 from iowbc.learning.environments import Environments
 from iowbc.learning.networks import Mirrors
+from iowbc.learning.policy import load_policy_weights, trained_network
 from iowbc.learning.ppo import Learner
 from iowbc.learning.storage import Network
-from iowbc.learning.trained import load_policy_weights, trained_network
 from iowbc.recipe.teacher import Teacher
 
 FLOOR_REACHED = 1.01
