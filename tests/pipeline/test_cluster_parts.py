@@ -102,8 +102,10 @@ def test_a_report_sends_the_last_progress_and_only_new_files(tmp_path: Path, mon
     write_files(tmp_path, {"a.checkpoint": b"one", "a.previous": b"none"})
     assert not report.stopping()
     report.files(tmp_path / "a.checkpoint")
-    report.flush(files=True)
-    report.end(files=True)
+    report.gather()
+    report.flush()
+    report.gather()
+    report.end()
     assert mailbox.told == [
         [
             ("progress", 2, 9, "at 2"),

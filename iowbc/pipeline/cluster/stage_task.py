@@ -88,9 +88,10 @@ def execute(
             )
             run(job)
         except BaseException:
-            report.end(files=True)
+            report.gather()
             raise
-        report.end()
+        finally:
+            report.end()
         return {} if shared else files_of(out)
 
 
@@ -129,7 +130,7 @@ class NodeReport:
 
     def files(self, path: Path) -> None:
         """Show a file or folder of the scratch in tracking; the driver has it before it hears of it."""
-        self._gather()
+        self.gather()
         self._add("shown", path.relative_to(self._work).as_posix())
 
     def stopping(self) -> bool:
@@ -137,19 +138,17 @@ class NodeReport:
         self._flush_when_due()
         return self._stop
 
-    def flush(self, *, files: bool = False) -> None:
-        """Send all buffered events, with `files` also new files of scratch."""
-        if files:
-            self._gather()
+    def flush(self) -> None:
+        """Send all buffered events."""
         self._reported = time.monotonic()
         if self._answer is not None and ray.wait([self._answer], timeout=0)[0]:
             self._stop = bool(ray.get(self._answer))
         events, self._events = self._events, []
         self._answer = self._mailbox.report.remote(self._task, events)
 
-    def end(self, *, files: bool = False) -> None:
+    def end(self) -> None:
         """Send the rest and wait until all has arrived; events arrive in order."""
-        self.flush(files=files)
+        self.flush()
         ray.get(self._answer)
 
     def _add(self, *event: Any) -> None:
@@ -159,12 +158,12 @@ class NodeReport:
     def _flush_when_due(self) -> None:
         now = time.monotonic()
         if now - self._reported > REPORT_INTERVAL:
-            look = now - self._looked > FILES_INTERVAL
-            if look:
+            if now - self._looked > FILES_INTERVAL:
                 self._looked = now
-            self.flush(files=look)
+                self.gather()
+            self.flush()
 
-    def _gather(self) -> None:
+    def gather(self) -> None:
         """Gather the files of scratch that the driver neither sees nor has; of checkpoints the last one is enough."""
         if not self._sends:
             return
