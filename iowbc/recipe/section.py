@@ -59,6 +59,7 @@ NonNegative = Annotated[float, Field(ge=0)]
 PositiveRange = Annotated[tuple[PositiveFloat, PositiveFloat], AfterValidator(in_order)]
 NonNegativeRange = Annotated[tuple[NonNegative, NonNegative], AfterValidator(in_order)]
 Share = Annotated[float, Field(ge=0, le=1)]
+Vector = tuple[float, float, float]
 HiddenLayers = Annotated[tuple[Annotated[int, Field(gt=0, le=16_384)], ...], Field(max_length=16)]
 """Units of the hidden layers of a network."""
 ArtifactName = Annotated[str, Field(pattern=r"^([0-9a-f]{8,64}|.+\.ya?ml)$", max_length=300)]

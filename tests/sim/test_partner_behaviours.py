@@ -6,7 +6,7 @@ from changes import changed
 from pydantic import TypeAdapter, ValidationError
 
 from iowbc.recipe.simulation.holding import HOLDABLE, Held
-from iowbc.recipe.simulation.partner import BEHAVIOURS, TRAINED, Behaviours
+from iowbc.recipe.simulation.partner import BEHAVIOURS, Behaviours
 from iowbc.recipe.simulation.partner import PartnerSettings as Recipe
 from iowbc.recipe.simulation.simulation import SimulationSettings
 from iowbc.sim.episode_draws import Draws
@@ -126,7 +126,7 @@ def test_training_draws_behaviours_by_their_shares_and_never_those_of_evaluation
     counts = np.bincount(draws.values["partner_behaviour"].astype(int), minlength=len(BEHAVIOURS)) / n
     assert counts[[1, 2]] == pytest.approx([0.75, 0.25], abs=0.03)
     assert not counts[[0, 3, 4, 5]].any()
-    assert set(Behaviours.model_fields) == set(TRAINED)
+    assert set(Behaviours.model_fields) == set(BEHAVIOURS[:-2])
 
 
 def test_behaviours_leave_all_other_draws_as_they_are(robot):

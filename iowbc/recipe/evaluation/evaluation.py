@@ -9,7 +9,7 @@ from iowbc.recipe.evaluation.model_based import ModelBased
 from iowbc.recipe.evaluation.public_controller import PublicController
 from iowbc.recipe.evaluation.sequences import DrawnScripts, Segment
 from iowbc.recipe.evaluation.suites import Compliance, HeavyCase, MassSweep, Probe, PushMap, Robustness, Stagnation
-from iowbc.recipe.section import COSMETIC, LATER, CustomName, Problems, Section
+from iowbc.recipe.section import COSMETIC, LATER, CustomName, Problems, Section, Vector
 from iowbc.recipe.simulation.scene import Object, Scene
 from iowbc.recipe.simulation.simulation import SimulationSettings
 
@@ -108,7 +108,7 @@ class TrialScene(Section):
 
     scene: Scene
     """The object and how it is held; it may also replace a training scene."""
-    wrists: tuple[float, float, float]
+    wrists: Vector
     """Base grasp: left wrist relative to the pelvis, heading frame [m]; as in `task.references.grasps`."""
     load: float | None = Field(default=0.0, ge=0.0)
     """Load that the arm references compensate [kg], as in `task.references.loads`; empty: that of `lift`."""

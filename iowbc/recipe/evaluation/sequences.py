@@ -8,7 +8,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from iowbc.recipe.section import Problems, Range, Section
+from iowbc.recipe.section import Problems, Range, Section, Vector
 
 Offset = Annotated[float, Field(ge=-0.5, le=0.5)]
 """Wrist offset along an axis [m]; arms of this size cannot reach farther from the grasp."""
@@ -21,7 +21,7 @@ class Segment(Section):
     """Length of the segment, its ramp included [s]."""
     ramp: float = Field(default=0.5, ge=0)
     """Time over which the command moves linearly from the previous segment's values [s]."""
-    velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    velocity: Vector = (0.0, 0.0, 0.0)
     """Commanded v_x, v_y [m/s] and yaw rate [rad/s] in the heading frame."""
     height: float | None = Field(default=None, ge=0.3, le=1.0)
     """Commanded pelvis height [m]; no humanoid of this size exceeds 1. Empty: the task's default height."""

@@ -12,8 +12,6 @@ LONGEST_DELAY = 10.0
 Behaviour = Literal["path", "follower", "leader", "stopping", "tugging", "lagging"]
 BEHAVIOURS: tuple[Behaviour, ...] = get_args(Behaviour)
 """All behaviours; `partner_behaviour` is an index into this list. The last two are for evaluation only."""
-TRAINED = BEHAVIOURS[:-2]
-"""Behaviours that training may draw."""
 
 
 class Behaviours(Section):

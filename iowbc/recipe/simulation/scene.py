@@ -5,9 +5,7 @@ from typing import Literal
 from pydantic import Field
 
 from iowbc.recipe.beside import MeshFile
-from iowbc.recipe.section import LATER, NamedEntries, Problems, Section
-
-Size = tuple[float, float, float]
+from iowbc.recipe.section import LATER, NamedEntries, Problems, Section, Vector
 
 
 class Grasp(Section):
@@ -56,7 +54,7 @@ class Object(Section):
     shape: Literal["box", "tyre", "cylinder", "mesh"]
     """`box`; `tyre`: a ring that stands across the robot's path, so that the hands hold its rim on both sides;
     `cylinder`: upright; `mesh`: triangles of a file, whose convex hull determines contact and inertia."""
-    size: Size | None = None
+    size: Vector | None = None
     """Extent along x (forward), y (left) and z (up) [m]; empty for a mesh, whose size is that of its file."""
     mass: float = Field(gt=0.0)
     """Nominal mass [kg]."""
@@ -94,7 +92,7 @@ class Scene(Section):
     """The object; empty in a free scene."""
     grasp: Grasp = Grasp()
     """Hold on the object in a lift scene."""
-    palm: tuple[float, float, float] = (0.0, -0.03, 0.0)
+    palm: Vector = (0.0, -0.03, 0.0)
     """Contact point of the left palm relative to the grip, in the hand's frame [m]; the right palm mirrors it."""
     gap: float = Field(default=0.01, ge=0.0)
     """Distance from the palms to the crate's face at the start of a push [m]."""

@@ -2,9 +2,7 @@
 
 from pydantic import Field
 
-from iowbc.recipe.section import PositiveRange, Range, Section
-
-Vector = tuple[float, float, float]
+from iowbc.recipe.section import PositiveRange, Range, Section, Vector
 
 
 class CommandRates(Section):

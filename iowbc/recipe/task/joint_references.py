@@ -4,9 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from iowbc.recipe.section import LATER, NamedEntries, Problems, Section
-
-Vector = tuple[float, float, float]
+from iowbc.recipe.section import LATER, NamedEntries, Problems, Section, Vector
 
 
 class Grasps(NamedEntries):
