@@ -11,7 +11,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,6 +20,7 @@ from iowbc.processes import die_with_parent
 
 if TYPE_CHECKING:
     from iowbc.pipeline.cluster.cluster import Cluster
+    from iowbc.pipeline.cluster.spread import NodeSpread
 
 NODE = {
     "object_store_memory": 1 << 30,  # bytes on each node; what is more goes to disk
@@ -66,6 +67,13 @@ def connected_nodes(cores: Sequence[int]) -> "Iterator[Cluster]":
     """A connection to such a cluster, whose nodes keep to their own disks."""
     with local_nodes(cores) as address, connected(address, copy=True) as cluster:
         yield cluster
+
+
+def spread_over(cluster: "Cluster", paths: Iterable[Path]) -> "NodeSpread":
+    """The nodes for calls that read these folders of this machine."""
+    from iowbc.pipeline.cluster.spread import NodeSpread
+
+    return NodeSpread({path: cluster.folder(path) for path in paths}, lambda: False, lambda text: None)
 
 
 def _started(cores: Sequence[int], folder: str) -> tuple["subprocess.Popen[bytes]", str]:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import psutil
 import torch
-from local_nodes import connected_nodes
+from local_nodes import connected_nodes, spread_over
 
 from iowbc.benchmarks.standing_generator import generator_of
 from iowbc.evaluation.trials.plan import Trial, planned_sweeps
@@ -167,7 +167,7 @@ def _world(recipe: Recipe) -> Iterator[Workload]:
 
 def _paces(cluster: "Cluster", world: Workload, nodes: int) -> tuple[dict[str, Throughput], dict[str, float]]:
     """How fast a cluster is, and the bytes of what passes between its nodes."""
-    spread = cluster.spread(world.folders.values())
+    spread = spread_over(cluster, world.folders.values())
 
     def played(batches: Batches) -> list[tuple[str, bytes]]:
         return list(play_everywhere(spread, world.recipe, world.folders, batches))

@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import psutil
-from local_nodes import connected_nodes
+from local_nodes import connected_nodes, spread_over
 from stage_jobs import make_job
 from training_jobs import small_recipe
 
@@ -26,7 +26,7 @@ def main(folder: Path) -> None:
 
     with connected_nodes([1, 1]) as cluster:
         job = make_job(folder, recipe, workers=0, interrupted=after_an_update)
-        teacher.STAGE.run(replace(job, spread=cluster.spread([job.robot])))
+        teacher.STAGE.run(replace(job, spread=spread_over(cluster, [job.robot])))
     print(f"{len(killed)} actors, one of them killed")
 
 

@@ -2,8 +2,6 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from types import SimpleNamespace
-from typing import Any
 
 import pytest
 import scaling
@@ -20,11 +18,12 @@ def test_rates_efficiencies_times_and_sizes_are_named(monkeypatch: pytest.Monkey
     begun: list[int] = []
 
     @contextmanager
-    def here(cores: Sequence[int]) -> Iterator[Any]:
+    def here(cores: Sequence[int]) -> Iterator[None]:
         begun.append(len(cores))
-        yield SimpleNamespace(spread=lambda paths: Backwards())
+        yield None
 
     monkeypatch.setattr(scaling, "connected_nodes", here)
+    monkeypatch.setattr(scaling, "spread_over", lambda cluster, paths: Backwards())
     monkeypatch.setattr(scaling, "label_all", lambda *words, **settings: None)
     monkeypatch.setattr(scaling, "_timed", timed)
     monkeypatch.setattr(scaling, "SHARES", 1)

@@ -2,7 +2,6 @@
 
 import secrets
 import shutil
-from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,7 @@ import ray
 
 from iowbc.errors import Interrupted, IowbcError, StageFailed
 from iowbc.pipeline.cluster.folders import Files, SharedFolder, files_of, write_files
-from iowbc.pipeline.cluster.spread import POLL, TRIES, NodeSpread, raised
+from iowbc.pipeline.cluster.spread import POLL, TRIES, raised
 from iowbc.pipeline.cluster.stage_task import Event, Mailbox, execute, marker
 from iowbc.pipeline.code import identity
 from iowbc.pipeline.stage import Job, Stage
@@ -65,10 +64,6 @@ class Cluster:
             job.out.mkdir()
         raise StageFailed(f"lost its node or worker {TRIES} times; is there too little memory for it?")
 
-    def spread(self, paths: Iterable[Path]) -> NodeSpread:
-        """The nodes for calls that read these folders of this machine."""
-        return NodeSpread({path: self._folder(path) for path in paths}, lambda: False, lambda text: None)
-
     def abort(self) -> None:
         self.aborted = True
 
@@ -86,9 +81,9 @@ class Cluster:
         running = self._execute.options(num_cpus=cores, name=stage.name).remote(
             stage.run,
             partial(Job, recipe=job.recipe, key=job.key, workers=workers),
-            robot=self._folder(job.robot),
-            inputs={read: self._folder(path) for read, path in job.inputs.items()},
-            predecessor=None if job.predecessor is None else self._folder(job.predecessor),
+            robot=self.folder(job.robot),
+            inputs={read: self.folder(path) for read, path in job.inputs.items()},
+            predecessor=None if job.predecessor is None else self.folder(job.predecessor),
             out=job.out.absolute(),
             work=job.work.absolute(),
             scratch=scratch,
@@ -125,7 +120,7 @@ class Cluster:
         finally:
             marker(job.work, task).unlink(missing_ok=True)
 
-    def _folder(self, path: Path) -> SharedFolder:
+    def folder(self, path: Path) -> SharedFolder:
         """A folder that nodes can fetch; each goes into the object store once."""
         if path not in self._folders:
             files = (ray.put(files_of(path)),)
