@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from stable_baselines3.common.policies import ActorCriticPolicy
 from torch import Tensor, nn
 
+from iowbc.learning.checkpoint import Arrays
 from iowbc.learning.gaussian import log_density, std_places
 from iowbc.learning.history_actor import HistoryActor, HistoryNormalizer, NewestCritic, student_architecture
 from iowbc.learning.networks import (
@@ -29,6 +30,8 @@ INVARIANT = MirrorMap(np.zeros(1, np.int64), np.ones(1, np.float32))
 """Mirror of the value: a state and its mirror image have the same value."""
 HIDDEN_GAIN, POLICY_GAIN, VALUE_GAIN = float(np.sqrt(2.0)), 0.01, 1.0
 """Gains of the initial orthogonal weights, as in stable-baselines3. The policy starts close to the reference."""
+ACTS = ("actor.", "log_stds")
+"""Name prefixes of the arrays of an `ActorCritic` that determine its actions."""
 
 
 class ActorCritic(ActorCriticPolicy):  # type: ignore[misc]
@@ -130,6 +133,11 @@ class ActorCritic(ActorCriticPolicy):  # type: ignore[misc]
 
     def _mean(self, obs: Tensor) -> Tensor:
         return self.actor(self.normalizer(obs))
+
+
+def acting_part(arrays: Mapping[str, NDArray[Any]]) -> Arrays:
+    """Arrays of an `ActorCritic` that determine its actions."""
+    return {name: value for name, value in arrays.items() if name.startswith(ACTS)}
 
 
 def trained_network(

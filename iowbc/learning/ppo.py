@@ -20,7 +20,6 @@ from torch import Tensor
 
 from iowbc.arrays import Array
 from iowbc.learning.as_numpy import acting_policy
-from iowbc.learning.best import acting_part
 from iowbc.learning.checkpoint import Arrays, module_arrays, restore_module
 from iowbc.learning.computing import ParallelBatch, reduced
 from iowbc.learning.gaussian import divergence, entropy, exploration, log_density
@@ -28,7 +27,7 @@ from iowbc.learning.history_actor import student_architecture
 from iowbc.learning.networks import Mirrors, mirrors_as_json
 from iowbc.learning.normalization import Normalization
 from iowbc.learning.perceptron import Perceptron
-from iowbc.learning.policy import ActorCritic
+from iowbc.learning.policy import ActorCritic, acting_part
 from iowbc.learning.rollout import Samples, drawn_leaders, without_common_part
 from iowbc.recipe.skill.skill import SkillLearning
 from iowbc.recipe.teacher import Teacher

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,14 +12,13 @@ from numpy.typing import NDArray
 from iowbc.errors import StageFailed
 from iowbc.learning import checkpoint
 from iowbc.learning.acting import Policy, policy_of
-from iowbc.learning.best import Best, acting_part, averaged
-from iowbc.learning.checkpoint import Arrays, prefixed, under
+from iowbc.learning.checkpoint import Arrays, module_arrays, prefixed, under
 from iowbc.learning.environments import Environments
 from iowbc.learning.networks import Mirrors
-from iowbc.learning.policy import load_policy_weights, trained_network
+from iowbc.learning.policy import acting_part, load_policy_weights, trained_network
 from iowbc.learning.ppo import Learner
 from iowbc.learning.storage import Network
-from iowbc.recipe.teacher import Teacher
+from iowbc.recipe.teacher import Check, Teacher
 
 FLOOR_REACHED = 1.01
 """A standard deviation within this factor of its floor counts as at the floor."""
@@ -27,6 +27,59 @@ COLLAPSED_SHARE = 0.5
 
 Score = Callable[[Policy], Mapping[str, float]]
 """Evaluation of a policy: metrics that include `score`, higher is better."""
+
+
+@dataclass
+class Best:
+    """Best learner state so far, with rollback to it after a collapse."""
+
+    settings: Check
+    learner: Arrays
+    """At first the state before the first update."""
+    score: float = 0.0
+    caution: float = 1.0
+    """Factor of the desired KL divergence."""
+    rollbacks: int = 0
+    """Rollbacks since the last improvement."""
+    low: int = 0
+    """Number of consecutive scores far below the best."""
+
+    def collapsed(self, score: float) -> bool:
+        """True if this is the last of `patience` consecutive scores far below the best."""
+        far_below = self.score >= self.settings.notable and score < (1.0 - self.settings.collapse) * self.score
+        self.low = self.low + 1 if far_below else 0
+        return self.low >= self.settings.patience
+
+    def offer(self, score: float, learner: Arrays) -> None:
+        """Keep this learner state if its score equals or exceeds the best."""
+        if score >= self.score:
+            self.score, self.learner, self.rollbacks = score, learner, 0
+
+    def go_back(self, why: str) -> Arrays:
+        """Best learner state; also lowers `caution`. Raises StageFailed after too many rollbacks."""
+        self.rollbacks += 1
+        if self.rollbacks > self.settings.rollbacks:
+            raise StageFailed(
+                f"{why}, and all teacher.check.rollbacks ({self.settings.rollbacks}) are used up; lower "
+                "teacher.desired_kl or teacher.learning_rate, or raise it"
+            )
+        self.caution *= self.settings.caution
+        self.low = 0
+        return self.learner
+
+    def arrays(self) -> Arrays:
+        """State for a checkpoint."""
+        return {
+            **prefixed("learner", self.learner),
+            "score": np.array([self.score, self.caution]),
+            "rollbacks": np.array([self.rollbacks, self.low]),
+        }
+
+    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Inverse of `arrays`."""
+        self.learner = under("learner", arrays)
+        self.score, self.caution = arrays["score"].tolist()
+        self.rollbacks, self.low = arrays["rollbacks"].tolist()
 
 
 class TeacherTraining:
@@ -56,9 +109,9 @@ class TeacherTraining:
         self._steps_an_update = settings.environments * settings.rollout
         self.model = Learner(settings, environments, seed, mirrors, cores, value_only, device)
         self.average: Arrays = {}
-        """Running average of the policies' acting parts; empty unless the recipe wants one."""
+        """Exponentially weighted mean of the policies' acting parts; empty unless the recipe wants one."""
         if settings.average_half_life is not None:
-            self.average = acting_part(checkpoint.module_arrays(self.model.policy))
+            self.average = acting_part(module_arrays(self.model.policy))
         self.best = Best(settings.check, self._learner_state())
 
     @property
@@ -78,8 +131,9 @@ class TeacherTraining:
         model.collect()
         training = model.train()
         if self.settings.average_half_life is not None:
-            updates = self.settings.average_half_life / self._steps_an_update
-            self.average = averaged(self.average, model.policy, updates)
+            half_life = self.settings.average_half_life / self._steps_an_update  # in updates
+            weight, newest = np.float32(1.0 - 0.5 ** (1.0 / half_life)), acting_part(module_arrays(model.policy))
+            self.average = {name: mean + weight * (newest[name] - mean) for name, mean in self.average.items()}
         figures = self.environments.statistics() | self._judged(training)
         seconds = {f"seconds/{part}": spent for part, spent in model.seconds.items()}
         rest = time.perf_counter() - begin - sum(seconds.values())
@@ -118,14 +172,14 @@ class TeacherTraining:
     def _learner_state(self) -> Arrays:
         """State of the learner: networks, optimiser, normalisation statistics."""
         return {
-            **prefixed("policy", checkpoint.module_arrays(self.model.policy)),
+            **prefixed("policy", module_arrays(self.model.policy)),
             **prefixed("optimizer", checkpoint.optimizer_arrays(self.model.policy.optimizer)),
             **prefixed("normalization", self.model.normalization.arrays()),
         }
 
     def _acting(self) -> Arrays:
         """Parameters and buffers of the policy; its actor is the running average of policies if there is one."""
-        return checkpoint.module_arrays(self.model.policy) | self.average
+        return module_arrays(self.model.policy) | self.average
 
     def _scored(self) -> Arrays:
         """State of the learner with the policy of `_acting`, which checks score."""
@@ -172,7 +226,7 @@ class TeacherTraining:
         model.normalization.inherited = network.normalizer.mean.numpy(), network.normalizer.std.numpy()
         model.normalization.move(model.policy.normalizer)
         if self.average:
-            self.average = acting_part(checkpoint.module_arrays(model.policy))
+            self.average = acting_part(module_arrays(model.policy))
         model.value_alone = self.settings.value_first
         if self.settings.desired_kl is not None:
             model.learning_rate = min(self.settings.learning_rate_range)
