@@ -91,15 +91,9 @@ def side_by_side(parts: Sequence[Trajectories]) -> Trajectories:
     offsets = np.cumsum([0, *(part.reward.shape[1] for part in parts[:-1])])
     cut = np.concatenate([part.cut + np.array([0, offset]) for part, offset in zip(parts, offsets, strict=True)])
     order = np.lexsort((cut[:, 1], cut[:, 0]))
-
-    def joined(name: str) -> Array:
-        return np.concatenate([getattr(part, name) for part in parts], axis=1)
-
+    whole = ("observation", "action", "reward", "ended")
     return Trajectories(
-        observation=joined("observation"),
-        action=joined("action"),
-        reward=joined("reward"),
-        ended=joined("ended"),
+        **{name: np.concatenate([getattr(part, name) for part in parts], axis=1) for name in whole},
         cut=cut[order],
         cut_observation=np.concatenate([part.cut_observation for part in parts])[order],
         records={name: np.concatenate([part.records[name] for part in parts], axis=1) for name in parts[0].records},
