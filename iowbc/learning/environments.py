@@ -15,8 +15,7 @@ from iowbc.rollouts.trajectories import Trajectories
 
 
 class Environments(Protocol):
-    """Stable-baselines3 vector environment that makes whole rollouts and can be saved and restored, such as the task's
-    `VectorEnv`."""
+    """Vector environment of stable-baselines3 that makes whole rollouts and can be saved, such as `VectorEnv`."""
 
     num_envs: int
     observation_space: Any
@@ -94,10 +93,6 @@ class HistoryEnvironments(VecEnvWrapper):  # type: ignore[misc]
         """See `Environments`."""
         self._history.frames[:] = self._history.frames[source]
         return self._beside(self._history.frames, self.venv.copy(source))
-
-    def statistics(self) -> dict[str, float]:
-        """Statistics since the last call."""
-        return self.venv.statistics()
 
     def state(self) -> dict[str, NDArray[Any]]:
         """Complete state, for a checkpoint."""
