@@ -20,10 +20,7 @@ Result = TypeVar("Result")
 
 
 def prepare_process() -> None:
-    """Limit torch to one thread in this process and keep freed memory for later arrays.
-
-    Small networks gain little from more threads, which also change the order of rounding.
-    """
+    """Limit torch to one thread, since more gain little and change the order of rounding; keep freed memory."""
     torch.set_num_threads(1)
     keep_freed_memory()
 

@@ -103,8 +103,7 @@ class MlpEncoder(nn.Module):
 
 
 class MirroredEncoder(nn.Module):
-    """Encoder of half the size, applied to a history and to its mirror image. Mirroring the history therefore swaps
-    the halves of the latent."""
+    """Encoder of half the size, of a history and of its mirror image: mirroring swaps the halves of the latent."""
 
     permutation: Tensor
     sign: Tensor

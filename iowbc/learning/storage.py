@@ -28,8 +28,7 @@ def save_network(
 
 
 def load_network(folder: Path, names: Sequence[str] = NAMES) -> tuple[Network, dict[str, Any]]:
-    """Load the network of a stage's artifact, the first of these base names; returns it in evaluation mode, and the
-    JSON."""
+    """The network of a stage's artifact, the first of these base names, in evaluation mode, and the JSON."""
     path = next((folder / f"{name}.json" for name in names if (folder / f"{name}.json").is_file()), None)
     if path is None:
         found = sorted(p.name for p in folder.glob("*.json"))
@@ -57,8 +56,7 @@ def require_layout(folder: Path, about: Mapping[str, Any], layout: Mapping[str, 
 
 
 def load_teacher(folder: Path, name: str = "teacher") -> tuple[TeacherNetwork, dict[str, Any]]:
-    """The network of a kind of teacher in a stage's artifact, and the JSON. Raises StageFailed for a student, which
-    PPO leaves with `teacher.history`."""
+    """A teacher in a stage's artifact, and the JSON. Raises StageFailed for a student, as of `teacher.history`."""
     network, about = load_network(folder, (name,))
     if not isinstance(network, TeacherNetwork):
         raise StageFailed(f"{folder}: its policy acts on a history; name a teacher with privileged information")

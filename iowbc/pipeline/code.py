@@ -97,8 +97,7 @@ def versions() -> dict[str, str]:
 
 @functools.cache
 def identity() -> Mapping[str, str]:
-    """The properties of this machine that results depend on, and its name as `host`: `versions()`, and the digest of
-    the package's modules as `code`."""
+    """This machine's name as `host`, its `versions()`, and the digest of the package's modules as `code`."""
     sources = sorted(PACKAGE.rglob("*.py"))
     code = content_digest({path.relative_to(PACKAGE).as_posix(): file_digest(path) for path in sources})
     return {"host": gethostname(), **versions(), "code": code[:CODE_DIGITS]}

@@ -24,8 +24,7 @@ def block_size(environments: int) -> int:
 
 
 def shares_in_blocks(environments: int, parts: int, size: int | None = None) -> list[tuple[int, int]]:
-    """First and last environment (excluded) of nearly equal groups of whole blocks, at most `parts`; `size` of a block,
-    by default that of `block_size`."""
+    """First and last environment (excluded) of at most `parts` nearly equal groups of whole blocks of a `size`."""
     size = size or block_size(environments)
     blocks = -(-environments // size)
     parts = min(parts, blocks)

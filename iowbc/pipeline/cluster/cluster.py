@@ -51,8 +51,7 @@ class Cluster:
         return f"Ray at {ray.get_runtime_context().gcs_address}: {nodes}, {self.cores} cores"
 
     def run(self, stage: Stage, job: Job) -> None:
-        """Run a stage on a node, as `stage.run(job)` would here. If it is lost, retry from the last reported
-        checkpoint.
+        """Run a stage on a node as `stage.run(job)` would here; if it is lost, again from its last reported checkpoint.
 
         Raises what the stage raises; RuntimeError with the node's traceback for an unexpected error.
         """
@@ -71,8 +70,7 @@ class Cluster:
         ray.shutdown()
 
     def _attempt(self, stage: Stage, job: Job) -> Files | None:
-        """One attempt; the stage's output, as far as the node did not write it here. None where node or worker is
-        lost."""
+        """One attempt: the output that the node did not write here itself; None where node or worker is lost."""
         task, workers = secrets.token_hex(8), min(job.workers, self.largest)
         # A stage that only waits for its pieces reserves no core, so that they can run.
         cores = 0 if stage.spreads(job.recipe) else workers

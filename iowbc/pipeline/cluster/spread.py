@@ -186,8 +186,7 @@ class NodeSpread:
     def actor_pool(
         self, called: str, make: Callable[..., Any], calls: Sequence[tuple[Any, ...]], folders: Mapping[str, Path]
     ) -> NodeActorPool:
-        """Members on any nodes, made by a function of a module from each of these arguments and
-        `folders`, as above. `called`: the members' name in messages."""
+        """Members on any nodes, each made as a call above is. `called`: the members' name in messages."""
         own = {name: self._folders[path] for name, path in folders.items()}
         return NodeActorPool(called, make, calls, own, self._interrupted, self._say)
 
