@@ -17,7 +17,7 @@ def acting_policy(policy: ActorCritic) -> RowPolicy | HistoryPolicy:
     """NumPy policy of the mean action of PPO's policy."""
     normalizer, actor = policy.normalizer, policy.actor
     if isinstance(actor, HistoryActor):
-        return _history_policy(actor.network, _normal(normalizer, actor.observation))
+        return student_policy(actor.network, _normal(normalizer, actor.observation))
     return RowPolicy(_normal(normalizer), _layers(actor))
 
 
@@ -26,11 +26,6 @@ def numpy_policy(network: TeacherNetwork | StudentNetwork) -> RowPolicy | Histor
     if isinstance(network, StudentNetwork):
         return student_policy(network)
     return RowPolicy(_normal(network.normalizer), _layers(network.body))
-
-
-def student_policy(network: StudentNetwork) -> HistoryPolicy:
-    """NumPy policy of a student."""
-    return _history_policy(network, _normal(network.normalizer))
 
 
 @torch.no_grad()
@@ -77,7 +72,8 @@ def _head(head: SymmetricHead) -> Linear:
 
 
 @torch.no_grad()
-def _history_policy(network: StudentNetwork, normal: Normal) -> HistoryPolicy:
+def student_policy(network: StudentNetwork, normal: Normal | None = None) -> HistoryPolicy:
+    """NumPy policy of a student; `normal`: the normalisation, by default the network's own."""
     own, mirror, estimate = network.encoder, None, None
     if isinstance(own, MirroredEncoder):
         mirror = own.permutation.numpy(), own.sign.numpy()
@@ -89,7 +85,7 @@ def _history_policy(network: StudentNetwork, normal: Normal) -> HistoryPolicy:
     if network.estimate is not None:
         head = network.estimate.head
         estimate = _head(head) if isinstance(head, SymmetricHead) else _linear(head)
-    return HistoryPolicy(normal, encoder, estimate, _layers(network.body))
+    return HistoryPolicy(normal or _normal(network.normalizer), encoder, estimate, _layers(network.body))
 
 
 def _linear(layer: nn.Linear) -> Linear:
