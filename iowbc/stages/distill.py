@@ -1,6 +1,7 @@
 """Stage `distill`: the student acts, the teacher labels the states with actions, the student imitates (DAgger)."""
 
 from collections.abc import Iterator, Mapping
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -64,8 +65,7 @@ def run(job: Job) -> None:
     folders = list(dict.fromkeys(folder_of.values()))
     teachers, abouts = zip(*(load_network(folder, ("teacher",)) for folder in folders), strict=True)
     about = abouts[0]
-    environments = training_environments(job, count=settings.environments, seed=seed + 1)
-    try:
+    with closing(training_environments(job, count=settings.environments, seed=seed + 1)) as environments:
         environments.set_curriculum(about["curriculum"])
         layout = environments.layout
         own = dict(zip(layout.extra.names, layout.extra.mirrors, strict=True))
@@ -92,8 +92,6 @@ def run(job: Job) -> None:
         )
         curves = train(job, training, settings.checkpoint_every, _note)
         curriculum = environments.curriculum()
-    finally:
-        environments.close()
 
     layouts = {"observation": seen.describe(), "privileged": layout.describe()["privileged"]}
     about = {"layout": layouts, "curriculum": curriculum}
