@@ -178,8 +178,7 @@ class Encoder(Section):
 def sentences(section: type[BaseModel]) -> dict[str, str]:
     """Attribute docstrings of a section and its bases, by field name.
 
-    They are read on demand: pydantic's `use_attribute_docstrings` reads every section's source whenever a command
-    starts.
+    They are read on demand: pydantic's `use_attribute_docstrings` reads all sources whenever a command starts.
     """
     bases = [base for base in section.__bases__ if issubclass(base, BaseModel) and base is not BaseModel]
     (definition,) = ast.parse(textwrap.dedent(inspect.getsource(section))).body

@@ -127,7 +127,6 @@ def load_sweep(word: str, settings: Sequence[str], file: Path | None = None, mos
 
     settings: `path=value` holds for all points; `path=a,b` and `path=0..4` vary it. They override the file, and of
     several for one path the last counts.
-    most: largest number of points.
     """
     described = SweepFile() if file is None else _read_file(file)
     grid = {path: _expanded(values, f"{file}") for path, values in described.grid.items()}

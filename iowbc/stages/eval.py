@@ -170,8 +170,7 @@ def world_and_policy(
 
 
 def headline(summary: "pd.DataFrame") -> dict[str, float]:
-    """Main metrics: success and errors of each case and at the lightest and heaviest mass of each suite, and forces of
-    compliance trials."""
+    """Success and errors of each case and at each suite's lightest and heaviest mass; forces of compliance trials."""
     from iowbc.evaluation.report.aggregate import case_names
     from iowbc.evaluation.report.other_tables import PROBING
     from iowbc.evaluation.trials.errors import ERRORS

@@ -72,10 +72,7 @@ class RunRecord:
         self._journal.write("metrics", id=name, values=cleaned, step=step)
 
     def close(self, status: str, *, wait: bool = True) -> bool:
-        """End the run with MLflow's status and let the sender take what is left; True where MLflow has everything.
-
-        A run that has not begun has nothing to send.
-        """
+        """End the run with MLflow's status and let the sender take what is left; True where MLflow has everything."""
         if self._open is None:
             return True
         path = self._open.path
@@ -199,8 +196,7 @@ def sweep_record(runs: Runs, sweep: Sweep, execution: Execution) -> RunRecord:
 def record_figures(
     runs: Runs, name: str, figures: Mapping[str, float], text: str = "", files: Sequence[Path] = ()
 ) -> None:
-    """Record a run that has no stages, such as a benchmark: its figures by name, Markdown that describes it, and files
-    below `runs`."""
+    """Record a run without stages, such as a benchmark: figures by name, its description, and files below `runs`."""
     record = RunRecord(runs, new_journal(runs, name, Execution.model_fields["experiment"].default, "", {}))
     record.describe(text, figures, files)
     record.close("FINISHED")

@@ -22,8 +22,7 @@ SEVERAL = re.compile(r"[^,],[^,]|\d\.\.\d")
 
 
 def validate(tree: Located) -> Recipe:
-    """The recipe described by a tree merged into the defaults. Sections may be partial, including those that are off by
-    default.
+    """The recipe of a tree merged into the defaults. Sections may be partial, also those that are off by default.
 
     Raises `RecipeError` with all problems.
     """
