@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from iowbc.evaluation.report.aggregate import ALL_ERRORS, OVER_ALL_TRIALS, STILL
-from iowbc.evaluation.trials.outcome import Outcome
+from iowbc.evaluation.trials.rollout import Outcome
 from iowbc.recipe.recipe import Recipe
 from iowbc.task.commands.script import CommandScript, CommandSegment
 from iowbc.task.record.signals import Trace

@@ -14,9 +14,8 @@ from iowbc.deploy.controller import Controller, Values
 from iowbc.evaluation.exported import ExportedPolicy
 from iowbc.evaluation.trials.errors import ERRORS
 from iowbc.evaluation.trials.metrics import trial_metrics
-from iowbc.evaluation.trials.outcome import Outcome
 from iowbc.evaluation.trials.plan import UNDISTURBED, command_script, planned_episode
-from iowbc.evaluation.trials.rollout import play_episodes, play_in
+from iowbc.evaluation.trials.rollout import Outcome, play_episodes, play_in
 from iowbc.evaluation.trials.table import transported
 from iowbc.learning.acting import Policy
 from iowbc.recipe.evaluation.sequences import Segment

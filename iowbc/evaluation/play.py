@@ -15,10 +15,9 @@ from iowbc.errors import Interrupted, NoDisplay, require_known
 from iowbc.evaluation.exported import ExportedPolicy, exported_world
 from iowbc.evaluation.films import film_episode, written_film
 from iowbc.evaluation.play_request import PlayRequest
-from iowbc.evaluation.trials.outcome import Outcome
 from iowbc.evaluation.trials.plan import command_script, held_fixed, planned_episode, sequence_for
 from iowbc.evaluation.trials.protocol import evaluated_world
-from iowbc.evaluation.trials.rollout import play_in
+from iowbc.evaluation.trials.rollout import Outcome, play_in
 from iowbc.learning.acting import Policy, load_policy, unfinished_policy
 from iowbc.recipe.evaluation.evaluation import Evaluation
 from iowbc.recipe.recipe import Recipe

@@ -7,7 +7,7 @@ import pytest
 from made_up_trials import DT, RECIPE, ROBOT, outcome, script, trace
 
 from iowbc.evaluation.acceptance import Accepted, judged
-from iowbc.evaluation.trials.outcome import Outcome
+from iowbc.evaluation.trials.rollout import Outcome
 from iowbc.recipe.evaluation.sequences import Segment
 from iowbc.recipe.export import Acceptance
 from iowbc.robot.description import GRAVITY

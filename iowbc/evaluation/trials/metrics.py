@@ -8,7 +8,7 @@ from iowbc.evaluation.trials import errors
 from iowbc.evaluation.trials.feet import foot_metrics, ground_metrics
 from iowbc.evaluation.trials.impedance import impedance_metrics
 from iowbc.evaluation.trials.interaction import interaction_metrics, load_metrics, push_metrics
-from iowbc.evaluation.trials.outcome import Outcome
+from iowbc.evaluation.trials.rollout import Outcome
 from iowbc.evaluation.trials.transport import beside, commanded_path, covered
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import GRAVITY, Robot

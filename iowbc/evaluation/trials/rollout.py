@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -9,7 +10,6 @@ from numpy.typing import NDArray
 
 from iowbc.arrays import Array
 from iowbc.errors import Interrupted
-from iowbc.evaluation.trials.outcome import Outcome
 from iowbc.learning.acting import Policy
 from iowbc.task.episodes import Episode
 from iowbc.task.record.signals import RECORDED, Trace
@@ -21,6 +21,34 @@ if TYPE_CHECKING:
 
 INTERRUPT_CHECK_INTERVAL = 25
 """Control steps between checks for an interrupt."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Signals and termination of one episode."""
+
+    trace: Trace
+    seconds: float
+    """Duration until the end [s]."""
+    fallen: bool
+    dropped: bool
+    finished: bool
+    """True if the episode reached its time limit."""
+    drawn: Mapping[str, Array]
+    """Random draws by name, each of shape (k,)."""
+
+    @property
+    def survived(self) -> bool:
+        return self.finished and not (self.fallen or self.dropped)
+
+    @property
+    def ending(self) -> str:
+        """Kind of termination; "diverged" if the simulation stopped without a fall or a drop."""
+        if self.fallen:
+            return "fell"
+        if self.dropped:
+            return "dropped"
+        return "finished" if self.finished else "diverged"
 
 
 def play_episodes(

@@ -7,8 +7,8 @@ import numpy as np
 import pandas as pd
 
 from iowbc.evaluation.trials.metrics import trial_metrics
-from iowbc.evaluation.trials.outcome import Outcome
 from iowbc.evaluation.trials.plan import Trial
+from iowbc.evaluation.trials.rollout import Outcome
 from iowbc.recipe.evaluation.evaluation import Success
 from iowbc.recipe.export import Acceptance
 from iowbc.recipe.recipe import Recipe
