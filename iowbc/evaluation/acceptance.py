@@ -2,7 +2,6 @@
 
 import itertools
 from collections.abc import Callable
-from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,7 @@ from iowbc.evaluation.exported import ExportedPolicy
 from iowbc.evaluation.trials.errors import ERRORS
 from iowbc.evaluation.trials.metrics import trial_metrics
 from iowbc.evaluation.trials.plan import UNDISTURBED, command_script, planned_episode
-from iowbc.evaluation.trials.rollout import Outcome, play_episodes, play_in
+from iowbc.evaluation.trials.rollout import Outcome, play_episodes, play_in, playing
 from iowbc.evaluation.trials.table import transported
 from iowbc.learning.acting import Policy
 from iowbc.recipe.evaluation.sequences import Segment
@@ -25,7 +24,6 @@ from iowbc.recipe.simulation.holding import FREE
 from iowbc.robot.description import Robot, load_robot
 from iowbc.task.episodes import Episode
 from iowbc.task.specification import Specification
-from iowbc.task.vector.vector_env import VectorEnv
 
 TINY = 1e-9
 """Lower bound of an error, in its unit, as denominator of a relative difference."""
@@ -100,7 +98,7 @@ def run_acceptance(
     Returns the policy, which holds the largest difference of joint targets, and the results.
     """
     episodes = acceptance_episodes(world.recipe)
-    with closing(VectorEnv(world, num_envs=len(episodes), workers=0, seed=0, episodes=episodes)) as environment:
+    with playing(world, episodes) as environment:
         policy = ExportedPolicy(Controller.load(exported, robots=len(episodes)), environment)
         return policy, _each_judged(world, episodes, play_in(environment, policy, interrupted))
 
@@ -145,8 +143,7 @@ def golden_inputs(world: Specification, exported: Path, interrupted: Callable[[]
 
     Raises Interrupted.
     """
-    steps, episodes = world.recipe.export.golden_steps, (golden_episode(world.recipe),)
-    with closing(VectorEnv(world, num_envs=1, workers=0, seed=0, episodes=episodes)) as environment:
-        policy = ExportedPolicy(Controller.load(exported), environment, golden_steps=steps)
+    with playing(world, [golden_episode(world.recipe)]) as environment:
+        policy = ExportedPolicy(Controller.load(exported), environment, golden_steps=world.recipe.export.golden_steps)
         play_in(environment, policy, interrupted)
     return policy.inputs

@@ -17,7 +17,7 @@ from iowbc.arrays import Array
 from iowbc.errors import NoRenderer
 from iowbc.evaluation.report.aggregate import case_names
 from iowbc.evaluation.trials.plan import Trial
-from iowbc.evaluation.trials.rollout import Outcome, in_batch, play_in
+from iowbc.evaluation.trials.rollout import Outcome, in_batch, play_in, playing
 from iowbc.evaluation.trials.table import replayed
 from iowbc.learning.acting import Policy
 from iowbc.recipe.evaluation.evaluation import Video
@@ -156,7 +156,7 @@ def film_trial(
 ) -> None:
     """Replay the trial in a row of `trials.parquet` and pass its frames to `add`; see `film_episode`."""
     title = f"{row['variant']}: {row['case']}, {row['mass']:g} kg, trial {row['trial']}"
-    with closing(VectorEnv(world, num_envs=1, workers=0, seed=0, episodes=(replayed(row),))) as environment:
+    with playing(world, [replayed(row)]) as environment:
         film_episode(environment, in_batch(policy, row), add, video, title, interrupted, progress)
 
 
@@ -178,12 +178,8 @@ class TrainingFilms:
     def make(self, path: Path, policy: Policy, say: Callable[[str], None]) -> bool:
         """Film the trial; returns True on success. If rendering is not possible, reports it and disables videos."""
         title = f"{self.trial.case}, {self.trial.mass:g} kg, after {int(path.name.partition('_')[0]):,} steps"
-        episodes = (self.trial.episode,)
         try:
-            with (
-                closing(VectorEnv(self.world, num_envs=1, workers=0, seed=0, episodes=episodes)) as environment,
-                written_film(path, SMALL.fps) as add,
-            ):
+            with playing(self.world, [self.trial.episode]) as environment, written_film(path, SMALL.fps) as add:
                 film_episode(environment, policy, add, SMALL, title)
         except NoRenderer as reason:
             say(f"no films: {reason}")

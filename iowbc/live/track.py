@@ -3,7 +3,6 @@
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Sequence
-from contextlib import closing
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +13,7 @@ from iowbc.arrays import Array
 from iowbc.evaluation.side_by_side import Actor
 from iowbc.evaluation.trials.errors import ERRORS, deviations_from_clamped
 from iowbc.evaluation.trials.interaction import load_metrics
-from iowbc.evaluation.trials.rollout import in_batch, play_in, trace_of
+from iowbc.evaluation.trials.rollout import in_batch, play_in, playing, trace_of
 from iowbc.evaluation.trials.table import replayed
 from iowbc.live.drag import Drag
 from iowbc.live.drawing import VIEW, GameMarks
@@ -148,7 +147,7 @@ def played_again(
     progress: receives the time reached within the trial [s]. Raises Interrupted once `interrupted()` is true.
     """
     seen: list[Moment] = []
-    with closing(VectorEnv(actor.world, num_envs=1, workers=0, seed=0, episodes=(replayed(row),))) as environment:
+    with playing(actor.world, [replayed(row)]) as environment:
         recorder, policy = MomentRecorder(environment.batch, recorded(environment)), in_batch(actor.policy, row)
         look = recorder.look
         outcome = play_in(environment, policy, interrupted, progress, lambda seconds: seen.append(look(seconds)))[0]

@@ -51,6 +51,11 @@ class Outcome:
         return "finished" if self.finished else "diverged"
 
 
+def playing(world: Specification, episodes: Sequence[Episode], workers: int = 0) -> "closing[VectorEnv]":
+    """Environments that play these episodes, one each, and are closed with the block."""
+    return closing(VectorEnv(world, num_envs=len(episodes), workers=workers, seed=0, episodes=tuple(episodes)))
+
+
 def play_episodes(
     world: Specification,
     episodes: Sequence[Episode],
@@ -64,8 +69,7 @@ def play_episodes(
 
     progress: receives the time reached within the episodes [s]. Raises Interrupted once `interrupted()` is true.
     """
-    count, planned = len(episodes), tuple(episodes)
-    with closing(VectorEnv(world, num_envs=count, workers=workers, seed=0, episodes=planned)) as environment:
+    with playing(world, episodes, workers) as environment:
         return play_in(environment, policy, interrupted, progress)
 
 
