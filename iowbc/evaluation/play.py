@@ -40,10 +40,13 @@ class Source:
     key: str = ""
     """Stage key to which the checkpoint is bound."""
 
+    @property
+    def exported(self) -> bool:
+        return (self.policy / exported_folder.CONTRACT).is_file()
+
     def environment(self, episode: Episode) -> VectorEnv:
         """One in-process environment for an episode. Raises ContractBroken if an exported folder is damaged."""
-        exported = (self.policy / exported_folder.CONTRACT).is_file()
-        with contract.readable(self.policy) if exported else nullcontext():
+        with contract.readable(self.policy) if self.exported else nullcontext():
             return VectorEnv(self.world, num_envs=1, workers=0, seed=0, episodes=(episode,))
 
 
@@ -52,9 +55,7 @@ def with_evaluation(source: Source, evaluation: Evaluation) -> Source:
     scenes of its contract."""
     asked = source.world.recipe.model_copy(update={"eval": evaluation})
     world = replace(source.world, recipe=asked)
-    if not (source.policy / exported_folder.CONTRACT).is_file():
-        world = evaluated_world(world)
-    return replace(source, world=world)
+    return replace(source, world=world if source.exported else evaluated_world(world))
 
 
 def exported_source(folder: Path) -> Source:
@@ -65,7 +66,6 @@ def exported_source(folder: Path) -> Source:
 def play(
     source: Source,
     request: PlayRequest,
-    interrupted: Callable[[], bool] = lambda: False,
     progress: Callable[[float, float], None] = lambda seconds, duration: None,
 ) -> tuple[Episode, Outcome, int]:
     """Play one episode in the viewer or, with `request.video`, to that mp4 file (no display needed).
@@ -73,7 +73,7 @@ def play(
     Returns the episode, its outcome and the number of video frames, 0 in the viewer. progress: receives the rendered
     and the total duration of a video [s].
 
-    Raises NoDisplay, ContractBroken for a damaged export, Interrupted when interrupted or when the viewer is closed.
+    Raises NoDisplay, ContractBroken for a damaged export, Interrupted when the viewer is closed.
     """
     recipe = source.world.recipe
     episode = requested_episode(recipe, request)
@@ -83,7 +83,7 @@ def play(
         policy = open_policy(source, environment)
         if request.video is None:
             with in_window(environment.batch.simulation) as look:
-                return episode, play_in(environment, policy, interrupted, look=look)[0], 0
+                return episode, play_in(environment, policy, look=look)[0], 0
         settings = recipe.eval.video.model_copy(update={"duration": episode.duration})
         title = f"{recipe.name}: {episode.scene}, {request.object_mass:g} kg, seed {request.seed}"
         with written_film(request.video, settings.fps) as add:
@@ -91,7 +91,7 @@ def play(
             def further(seconds: float) -> None:
                 progress(seconds, episode.duration)
 
-            return episode, *film_episode(environment, policy, add, settings, title, interrupted, further)
+            return episode, *film_episode(environment, policy, add, settings, title, progress=further)
 
 
 def requested_episode(recipe: Recipe, request: PlayRequest) -> Episode:
@@ -104,7 +104,7 @@ def requested_episode(recipe: Recipe, request: PlayRequest) -> Episode:
 
 def open_policy(source: Source, environment: VectorEnv) -> Policy:
     """The policy of a source: an exported controller where there is a contract, else a network."""
-    if (source.policy / exported_folder.CONTRACT).is_file():
+    if source.exported:
         return ExportedPolicy(Controller.load(source.policy, robots=environment.num_envs), environment)
     if source.policy.is_dir():
         return load_policy(source.policy, environment.layout.describe())

@@ -18,8 +18,8 @@ class PlayRequest:
     scene: str = "lift"
     mass: float = 4.0
     """Mass of the object [kg]; 0: no object, as in the scene `free`."""
-    partner_share: float | None = 0.0
-    """Fraction of the weight carried by the partner; None: random."""
+    partner_share: float = 0.0
+    """Fraction of the weight carried by the partner."""
     sequence: tuple[Segment, ...] = ()
     """Commands; empty: the recipe's `eval.sequence`."""
     seed: int = 0

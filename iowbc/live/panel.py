@@ -129,7 +129,7 @@ class DrivingPanel(ControlPanel):
             self.scene = gui.add_dropdown("Scene", self._recipe.simulation.scenes.names, initial_value=request.scene)
             most = max(request.mass, self._heaviest(request.scene))
             self.mass = gui.add_slider("Mass [kg]", 0.0, most, 0.5, request.mass, hint="0 is without an object")
-            share = request.partner_share or 0.0
+            share = request.partner_share
             self.partner_share = gui.add_slider("Partner's share", 0.0, 1.0, 0.05, share, hint="Of the weight")
             self.seed = gui.add_number("Seed", request.seed, min=0, max=LAST_SEED, step=1)
             self.disturbances = gui.add_checkbox("Impulses, pushes", request.disturbances, hint="At random times")

@@ -255,8 +255,11 @@ def test_what_cannot_be_played_is_refused_with_what_can(done: Job, tmp_path: Pat
 
 
 def test_an_interrupted_film_leaves_no_file(done: Job, tmp_path: Path) -> None:
+    def interrupt(seconds: float, duration: float) -> None:
+        raise Interrupted("stopped")
+
     with pytest.raises(Interrupted):
-        play(exported_source(done.out), PlayRequest(video=tmp_path / "out.mp4"), interrupted=lambda: True)
+        play(exported_source(done.out), PlayRequest(video=tmp_path / "out.mp4"), interrupt)
     assert list(tmp_path.iterdir()) == []
 
 
