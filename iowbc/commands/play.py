@@ -21,12 +21,14 @@ from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.last_used import require_whole
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
+from iowbc.recipe.skill.skill import PartnerKinds
 from iowbc.report.runs import Run
 
 if TYPE_CHECKING:
     from iowbc.evaluation.play import Source
     from iowbc.evaluation.side_by_side import Actor
     from iowbc.live.track import Played
+    from iowbc.skill.single_game import SingleGame
 
 
 def play(
@@ -83,17 +85,23 @@ def play(
     if skill is not None:
         if mass == 0.0 or disturbances:
             raise UsageError("a game has an object (--mass above 0) and no random --disturbances: its human disturbs")
-        if page is None:
-            _play_game(store, console, skill, request, partner, mass, partner_share)
-            return
-        if partner is not None:
+        if page is not None and partner is not None:
             raise UsageError("--web and --partner exclude each other: on the page you are the human")
-        from iowbc.live.game import GamePanel, GameSession
+        from iowbc.skill.game import NOMINAL, ROBOT
         from iowbc.skill.plan import PERSON, Plan
+        from iowbc.skill.single_game import SingleGame
 
         world, student, robot, task = playable_skill(store, skill, scene)
-        tell(console, f"skill of {skill.manifest.recipe}: you are its partner")
-        first = Plan(task, PERSON, known=False, mass=mass, share=partner_share, seed=seed)
+        recipe, human = skill.manifest.recipe, PERSON if page else _human(world.recipe.skill.partners, partner)
+        first = Plan(task, human, known=False, mass=mass, share=partner_share, seed=seed)
+        if page is None:
+            with closing(SingleGame(world, student, NOMINAL | {ROBOT: robot}, first)) as game:
+                title = f"{recipe}: {task}, {game.mass:.0f} kg, partner {human}, seed {seed}"
+                _play_game(console, game, title, video)
+            return
+        from iowbc.live.game import GamePanel, GameSession
+
+        tell(console, f"skill of {recipe}: you are its partner")
         _serve(console, page, GameSession(world, student, robot, first), panel=GamePanel)
     elif partner is not None:
         raise UsageError(f"{word}: --partner is the human of a skill's game, and this names no skill")
@@ -134,45 +142,32 @@ def _serve(console: Console, port: int, session: "Played", **shown: Any) -> None
         Page(server, session, **shown).run(ready)
 
 
-def _play_game(
-    store: Store,
-    console: Console,
-    skill: Artifact,
-    request: PlayRequest,
-    partner: str | None,
-    mass: float | None,
-    share: float | None,
-) -> None:
-    """Play a game of a skill in the viewer or as a film; its human alone knows the path. Raises `UsageError`.
+def _human(partners: PartnerKinds, asked: str | None) -> str:
+    """The behaviour of a game's human: as asked, else the first not met in training. Raises `UsageError`."""
+    from iowbc.skill.plan import AGENT
 
-    partner: behaviour of the human; None for the first that the skill has not met in training. mass, share: of the
-    object [kg], and of its weight that the human bears; None draws them.
-    """
-    from iowbc.skill.game import NOMINAL, ROBOT
-    from iowbc.skill.plan import AGENT, Plan
-    from iowbc.skill.playing import film_game, show_game
-    from iowbc.skill.single_game import SingleGame
-
-    world, student, robot, task = playable_skill(store, skill, request.scene)
-    partners = world.recipe.skill.partners
     humans = [kind for kind in (*partners.held_out, *partners.training) if kind != AGENT]
-    human = partner or humans[0]
+    human = asked or humans[0]
     require_known(human, "human of the skill", humans)
-    plan = Plan(task, human, known=False, mass=mass, share=share, seed=request.seed)
-    with closing(SingleGame(world, student, NOMINAL | {ROBOT: robot}, plan)) as game:
-        title = f"{skill.manifest.recipe}: {task}, {game.mass:.0f} kg, partner {human}, seed {request.seed}"
-        tell(console, title)
-        made = ""
-        try:
-            if request.video is None:
-                show_game(game)
-            else:
-                pictures = film_game(game, request.video, title, film_progress(console, request.video))
-                made = f"; {request.video} has {pictures} pictures"
-        except Interrupted as stopped:
-            console.print(str(stopped), markup=False, highlight=False)
-            return
-        tell(console, f"{game.ending.replace('_', ' ')} after {game.seconds:.1f} s{made}")
+    return human
+
+
+def _play_game(console: Console, game: "SingleGame", title: str, video: Path | None) -> None:
+    """Play a game in the viewer or as a film."""
+    from iowbc.skill.playing import film_game, show_game
+
+    tell(console, title)
+    made = ""
+    try:
+        if video is None:
+            show_game(game)
+        else:
+            pictures = film_game(game, video, title, film_progress(console, video))
+            made = f"; {video} has {pictures} pictures"
+    except Interrupted as stopped:
+        console.print(str(stopped), markup=False, highlight=False)
+        return
+    tell(console, f"{game.ending.replace('_', ' ')} after {game.seconds:.1f} s{made}")
 
 
 def _driven(store: Store, console: Console, word: str, stage: str | None, plan: Run) -> "tuple[Source, Actor | None]":
