@@ -132,9 +132,8 @@ class GamePanel(ControlPanel):
             self.task.value = self._names[(self._names.index(self.task.value) + 1) % len(self._names)]
 
     def figures_at(self, track: Track, place: int) -> str:
-        moment = track.moments[place]
-        first = max(0, place + 1 - round(WINDOW / track.period))
-        pulls = [np.linalg.norm(track.moments[index].forces[0].force) for index in range(first, place + 1)]
+        latest = track.latest(place)
+        moment, pulls = latest[-1], [np.linalg.norm(one.forces[0].force) for one in latest]
         signals = {name: float(values[0]) for name, values in moment.signals.items()}
         rows = [
             ("your pull", f"{pulls[-1]:.0f} N"),

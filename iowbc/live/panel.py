@@ -144,7 +144,7 @@ class DrivingPanel(ControlPanel):
 
     def figures_at(self, track: Track, place: int) -> str:
         """The command and the state at a moment, and the errors of the seconds before."""
-        signals, readings = track.moments[place].signals, track.readings(place)
+        signals, (means, saturated) = track.moments[place].signals, track.readings(place)
         going, wanted = signals["system_velocity"], signals["commanded_velocity"]
         rows = [
             ("forward", wanted[0], going[0], "m/s"),
@@ -153,9 +153,9 @@ class DrivingPanel(ControlPanel):
             ("lean", signals["torso_pitch_command"][0], signals["torso_pitch"][0], "rad"),
         ]
         asked = [table_row(name, f"{first:+.2f}", f"{second:+.2f} {unit}") for name, first, second, unit in rows]
-        errors = [table_row(SYMBOLS[name], f"{readings.errors[name]:.3f} {unit}") for name, unit in UNITS.items()]
-        hands = "–" if isnan(readings.weight_in_hands) else f"{100 * readings.weight_in_hands:.0f} %"
-        worst = sorted(readings.saturated.items(), key=lambda pair: -pair[1])
+        errors = [table_row(SYMBOLS[name], f"{means[name]:.3f} {unit}") for name, unit in UNITS.items()]
+        hands = "–" if isnan(means["weight_in_hands"]) else f"{100 * means['weight_in_hands']:.0f} %"
+        worst = sorted(saturated.items(), key=lambda pair: -pair[1])
         limits = ", ".join(f"{escape(name.removesuffix('_joint'))} {100 * share:.0f} %" for name, share in worst)
         head = table_row("", "command", "is")
         return (

@@ -3,7 +3,6 @@
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,7 +10,7 @@ import pandas as pd
 
 from iowbc.arrays import Array
 from iowbc.evaluation.side_by_side import Actor
-from iowbc.evaluation.trials.errors import ERRORS, deviations_from_clamped
+from iowbc.evaluation.trials.errors import deviations_from_clamped
 from iowbc.evaluation.trials.interaction import load_metrics
 from iowbc.evaluation.trials.rollout import in_batch, play_in, playing, trace_of
 from iowbc.evaluation.trials.table import replayed
@@ -28,18 +27,6 @@ PAST = 60.0
 """Length of the past of an episode that is kept, and can be looked at [s]."""
 WINDOW = 3.0
 """Figures are means over so long a time [s]; the weight in the hands leaves out its first second."""
-
-
-@dataclass(frozen=True)
-class TrackFigures:
-    """Figures of the seconds before a moment; NaN where there is nothing to measure."""
-
-    errors: dict[str, float]
-    """The paper's four errors, named as in `ERRORS`, relative to the clamped command."""
-    weight_in_hands: float
-    """Fraction of the object's weight, as far as the robot carries it, that is in the hands."""
-    saturated: dict[str, float]
-    """Part of the time at the torque limit, of the joints that ever were."""
 
 
 class Track:
@@ -66,19 +53,22 @@ class Track:
         steps = round((seconds - self.moments[0].seconds) / self.period)
         return int(np.clip(steps, 0, len(self.moments) - 1))
 
-    def readings(self, place: int) -> TrackFigures:
+    def latest(self, place: int) -> list[Moment]:
+        """The moments of the `WINDOW` that ends at an index."""
         first = max(0, place + 1 - round(WINDOW / self.period))
-        seen = [self.moments[index] for index in range(first, place + 1)]
+        return [self.moments[index] for index in range(first, place + 1)]
+
+    def readings(self, place: int) -> tuple[dict[str, float], dict[str, float]]:
+        """Means over the `WINDOW` that ends at an index: the paper's errors relative to the clamped command and
+        `weight_in_hands`, NaN where nothing is to be measured; and the part of the time at the torque limit, of the
+        joints that ever were."""
+        seen = self.latest(place)
         signals = {name: np.stack([moment.signals[name] for moment in seen])[:, None] for name in RECORDED}
         trace = trace_of(signals, 0, len(seen), self.period)
         deviations = deviations_from_clamped(trace, max(1, round(self._gait_period / self.period)))
-        shares = trace.joint_saturation.mean(axis=0)
-        means, judged = deviations.means(), self.held_weight > Success().least_weight
-        return TrackFigures(
-            errors={name: means[name] for name in ERRORS},
-            weight_in_hands=load_metrics(trace, self.held_weight, judged)["weight_in_hands"],
-            saturated={name: float(share) for name, share in zip(self._joints, shares, strict=True) if share > 0},
-        )
+        load = load_metrics(trace, self.held_weight, self.held_weight > Success().least_weight)
+        shares = zip(self._joints, trace.joint_saturation.mean(axis=0).tolist(), strict=True)
+        return deviations.means() | load, {name: share for name, share in shares if share > 0}
 
 
 class Played(ABC):
