@@ -9,6 +9,7 @@ import numpy as np
 import trimesh
 
 from iowbc.arrays import Array
+from iowbc.robot import rotations
 
 GEOM = mujoco.mjtGeom
 HIDDEN_GROUP = 3
@@ -49,9 +50,7 @@ def _merged(model: Any, wanted: Callable[[int], bool]) -> Iterator[BodyMesh]:
             key = int(model.geom_bodyid[geom]), tuple(round(float(part), 4) for part in colour)
             chosen.setdefault(key, []).append(_triangles(model, geom))
     for (body, colour), parts in chosen.items():
-        starts = np.cumsum([0, *(len(vertices) for vertices, _ in parts[:-1])])
-        vertices = np.concatenate([vertices for vertices, _ in parts])
-        faces = np.concatenate([start + faces for start, (_, faces) in zip(starts, parts, strict=True)])
+        vertices, faces = trimesh.util.append_faces(*zip(*parts, strict=True))
         yield BodyMesh(model.body(body).name, vertices, faces, colour)  # type: ignore[arg-type]
 
 
@@ -66,9 +65,7 @@ def _triangles(model: Any, geom: int) -> tuple[Array, Array]:
     else:
         made = _primitive(kind, size)
         vertices, faces = np.asarray(made.vertices), np.asarray(made.faces)
-    turn = np.empty(9)
-    mujoco.mju_quat2Mat(turn, model.geom_quat[geom])
-    return vertices @ turn.reshape(3, 3).T + model.geom_pos[geom], faces
+    return rotations.rotate(model.geom_quat[geom], vertices) + model.geom_pos[geom], faces
 
 
 def _primitive(kind: Any, size: Array) -> Any:
