@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -32,17 +31,6 @@ COLUMNS = ["source", "trial", "seconds", "settled", "mass", "size", "inferred"]
 """Columns of `probe.parquet`; see `inferred_masses`."""
 LATENT, HISTORY, NEWEST, PRIVILEGED = "latent", "history H_t", "newest s_t", "s_priv"
 """Sources from which the mass is inferred."""
-
-
-@dataclass(frozen=True)
-class ProbeReadings:
-    """Features recorded in the trials, one row per reading."""
-
-    features: dict[str, Features]
-    """Features by source, each of shape (readings, k)."""
-    moments: pd.DataFrame
-    """Number of the `trial`, `seconds` since its start with the object in the hands, `settled` (the history no longer
-    holds the initial copies of the first observation), and `mass` of the object [kg]."""
 
 
 class RecordingPolicy:
@@ -87,8 +75,8 @@ def read(
     workers: int,
     interrupted: Callable[[], bool] = lambda: False,
     progress: Callable[[float], None] = lambda seconds: None,
-) -> ProbeReadings:
-    """Play the trials of `eval.probe`, lightest first, and record features until each ends. Raises Interrupted when
+) -> tuple[dict[str, Features], pd.DataFrame]:
+    """Play the trials of `eval.probe`, lightest first; returns the readings of `gathered`. Raises Interrupted when
     interrupted."""
     recipe, probe = world.recipe, world.recipe.eval.probe
     assert probe is not None
@@ -113,8 +101,10 @@ def gathered(
     times: NDArray[np.float64],
     masses: NDArray[np.float64],
     span: float,
-) -> ProbeReadings:
-    """Readings of all trials in one table, without those after a trial's end.
+) -> tuple[dict[str, Features], pd.DataFrame]:
+    """Readings of all trials without those after a trial's end: features by source, (readings, k), and a table with the
+    number of the `trial`, `seconds` since its start with the object in the hands, `settled` (the history no longer
+    holds the initial copies of the first observation), and `mass` of the object [kg].
 
     kept: features at each time, one row per trial; going: True before a trial's end, (times, trials); times: (times,)
     [s]; masses: (trials,) [kg]; span: duration of a history [s].
@@ -123,17 +113,16 @@ def gathered(
     features = {name: np.stack([seen[name] for seen in kept])[moment, trial] for name in kept[0]}
     seconds = times[moment]
     moments = {"trial": trial, "seconds": seconds, "settled": seconds >= span - EXACT, "mass": masses[trial]}
-    return ProbeReadings(features, pd.DataFrame(moments))
+    return features, pd.DataFrame(moments)
 
 
-def inferred_masses(readings: ProbeReadings) -> pd.DataFrame:
-    """Inferred masses in the test trials, one row per reading and source.
+def inferred_masses(features: dict[str, Features], moments: pd.DataFrame) -> pd.DataFrame:
+    """Inferred masses in the test trials, one row per reading and source, from readings of `gathered`.
 
     Columns: `source` and its `size`, `trial`, `seconds`, `settled` (True if the history was full), `mass` and
     `inferred` [kg]. The regression is fitted to settled readings of even trials and tested on odd trials, so that no
     trial is in both sets. Raises StageFailed if too few trials last long enough.
     """
-    moments = readings.moments
     tested = moments["trial"] % 2 == 1
     fitted = moments[~tested & moments["settled"]]
     lasted = fitted["trial"].nunique()
@@ -143,15 +132,15 @@ def inferred_masses(readings: ProbeReadings) -> pd.DataFrame:
             "or give lighter masses (eval.probe.masses) or a longer sequence (eval.probe.sequence)"
         )
     tables = []
-    for source, given in readings.features.items():
-        features = given.astype(np.float64)  # a history's columns are nearly alike: single precision is not enough
+    for source, given in features.items():
+        values = given.astype(np.float64)  # a history's columns are nearly alike: single precision is not enough
         search = GridSearchCV(
             Pipeline([("scale", StandardScaler()), ("ridge", Ridge())]),
             {"ridge__alpha": PENALTIES},
             cv=GroupKFold(FOLDS),
             scoring="neg_mean_squared_error",
         )
-        search.fit(features[fitted.index], fitted["mass"].to_numpy(), groups=fitted["trial"].to_numpy())
-        found = {"size": features.shape[1], "inferred": search.predict(features[tested])}
+        search.fit(values[fitted.index], fitted["mass"].to_numpy(), groups=fitted["trial"].to_numpy())
+        found = {"size": values.shape[1], "inferred": search.predict(values[tested])}
         tables.append(moments[tested].assign(**found, source=source)[COLUMNS])
     return pd.concat(tables, ignore_index=True)

@@ -118,7 +118,7 @@ def probe(job: Job, world: "Specification", policy: "Policy") -> dict[str, float
         job.report.progress(min(seconds, duration), duration, f"probe, {asked.trials} trials")
 
     readings = read(world, policy, workers=job.workers, interrupted=job.interrupted, progress=progress)
-    inferred = inferred_masses(readings).assign(
+    inferred = inferred_masses(*readings).assign(
         variant=job.recipe.eval.label, scene=asked.scene, partner_share=asked.partner_share
     )
     inferred.to_parquet(job.out / "probe.parquet", index=False)

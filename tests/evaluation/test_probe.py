@@ -1,6 +1,5 @@
 """The linear probe: what it fits, on which trials it is tested, and what it tells of a policy."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +14,7 @@ from iowbc.evaluation.probe import (
     LATENT,
     NEWEST,
     PRIVILEGED,
-    ProbeReadings,
+    Features,
     RecordingPolicy,
     gathered,
     inferred_masses,
@@ -29,7 +28,7 @@ KINDS = ("md", "tex", "csv", "json", "png")
 TRIALS, MOMENTS = 60, 6
 
 
-def readings() -> ProbeReadings:
+def readings() -> tuple[dict[str, Features], pd.DataFrame]:
     """Trials of 1 to 10 kg in which a sensor shows the mass with an error of 0.5 kg, and others name the trial."""
     trial = np.repeat(np.arange(TRIALS), MOMENTS)
     mass = np.linspace(1.0, 10.0, TRIALS)[trial]
@@ -39,12 +38,12 @@ def readings() -> ProbeReadings:
     features = {"sensor": np.column_stack([0.3 * shown - 2.0, names]), "names": names}
     seconds = np.tile(np.arange(MOMENTS) * 0.5, TRIALS)
     moments = pd.DataFrame({"trial": trial, "seconds": seconds, "settled": seconds > 0, "mass": mass})
-    return ProbeReadings({name: values.astype(np.float32) for name, values in features.items()}, moments)
+    return {name: values.astype(np.float32) for name, values in features.items()}, moments
 
 
 @pytest.fixture(scope="module")
 def inferred() -> pd.DataFrame:
-    return inferred_masses(readings()).assign(variant="IO-WBC", scene="lift", partner_share=0.0)
+    return inferred_masses(*readings()).assign(variant="IO-WBC", scene="lift", partner_share=0.0)
 
 
 def test_what_shows_the_mass_infers_it_in_trials_of_other_masses(inferred: pd.DataFrame) -> None:
@@ -59,10 +58,9 @@ def test_what_names_the_trial_alone_infers_nothing(inferred: pd.DataFrame) -> No
 
 
 def test_trials_that_end_at_once_are_no_probe() -> None:
-    found = readings()
-    short = replace(found, moments=found.moments.assign(settled=False))
+    features, moments = readings()
     with pytest.raises(StageFailed, match=r"only 0 of the trials.*eval.probe.masses"):
-        inferred_masses(short)
+        inferred_masses(features, moments.assign(settled=False))
 
 
 def test_means_over_a_second_and_a_trial_say_more_than_a_reading(inferred: pd.DataFrame) -> None:
@@ -74,11 +72,11 @@ def test_means_over_a_second_and_a_trial_say_more_than_a_reading(inferred: pd.Da
 def test_readings_end_with_their_trial_and_settle_with_a_full_history() -> None:
     kept = [{"x": np.full((2, 1), moment, np.float32)} for moment in range(3)]
     going = np.array([[True, True], [True, True], [True, False]])
-    found = gathered(kept, going, np.array([0.0, 0.5, 1.0]), np.array([2.0, 4.0]), span=0.5)
-    assert found.moments["trial"].tolist() == [0, 1, 0, 1, 0]
-    assert found.moments["mass"].tolist() == [2.0, 4.0, 2.0, 4.0, 2.0]
-    assert found.features["x"][:, 0].tolist() == [0, 0, 1, 1, 2]
-    assert found.moments["settled"].tolist() == [False, False, True, True, True]
+    features, moments = gathered(kept, going, np.array([0.0, 0.5, 1.0]), np.array([2.0, 4.0]), span=0.5)
+    assert moments["trial"].tolist() == [0, 1, 0, 1, 0]
+    assert moments["mass"].tolist() == [2.0, 4.0, 2.0, 4.0, 2.0]
+    assert features["x"][:, 0].tolist() == [0, 0, 1, 1, 2]
+    assert moments["settled"].tolist() == [False, False, True, True, True]
 
 
 def rows(size: int, seed: int = 0) -> NDArray[np.float32]:
