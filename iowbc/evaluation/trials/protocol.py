@@ -98,7 +98,8 @@ class Protocol:
     total: int = field(init=False, default=0)
 
     def run(self) -> pd.DataFrame:
-        """All trials, one row each: the table of `trials.parquet`. Raises Interrupted when interrupted."""
+        """All trials, one row each, by suite, mass and order of play: the table of `trials.parquet`. Raises Interrupted
+        when interrupted."""
         recipe = self.world.recipe
         sweeps = planned_sweeps(recipe)
         named = [trial for sweep in sweeps for trial in sweep.named()]
@@ -113,7 +114,12 @@ class Protocol:
         ]:
             further = [trial for sweep, mass in going for trial in sweep.trials([mass])]
             tables.append(self._round(len(tables), further))
-        return _in_order(pd.concat(tables, ignore_index=True), list(dict.fromkeys(trial.suite for trial in named)))
+        suites = list(dict.fromkeys(trial.suite for trial in named))
+        return pd.concat(tables).sort_values(
+            ["suite", "mass"],
+            key=lambda values: values.map(suites.index) if values.name == "suite" else values,
+            ignore_index=True,
+        )
 
     def _round(self, number: int, trials: Sequence[Trial]) -> pd.DataFrame:
         """Play trials in batches, if possible on other machines; returns their table."""
@@ -183,9 +189,3 @@ def _suites(trials: Sequence[Trial]) -> str:
 
 def _succeeds(table: pd.DataFrame, suite: str, mass: float) -> bool:
     return bool(table.loc[(table["suite"] == suite) & (table["mass"] == mass), "succeeded"].any())
-
-
-def _in_order(table: pd.DataFrame, suites: Sequence[str]) -> pd.DataFrame:
-    """Sort by suite, then mass, then order of play."""
-    order = table.assign(_rank=table["suite"].map(suites.index))
-    return order.sort_values(["_rank", "mass"], kind="stable").drop(columns="_rank").reset_index(drop=True)
