@@ -6,7 +6,7 @@ import numpy as np
 
 from iowbc import counter_random as random
 from iowbc.arrays import Array
-from iowbc.control.command import COMMAND, nominal_command, rate_limits
+from iowbc.control.command import nominal_command, rate_limits
 from iowbc.recipe.evaluation.sequences import DrawnScripts
 from iowbc.recipe.section import Range
 from iowbc.recipe.task.commands import Commands
@@ -62,7 +62,7 @@ class _Motions:
             forward = self._between(scripts.walking) * (next(self.numbers) < 0.5)  # on the spot in half of the turns
             turns.append(self._walk(forward, 0.0, sign * self._between(scripts.turning)))
         crouch = self._stand(self._between(scripts.crouch), self._between((0.0, scripts.pitch[1])))
-        return [raised, *turns, back, side, crouch, self._bow(), self._posture(self._stand())]
+        return [raised, *turns, back, side, crouch, self._bow(), self._posture()]
 
     def behind_a_crate(self) -> list[Array]:
         """Motions behind a crate; neither backward nor sideways, since the hands do not hold it."""
@@ -74,24 +74,24 @@ class _Motions:
         low = self.straight()
         low[3:5] = self._between(scripts.crouch), self._between((0.2, 0.5))
         bowed = self._stand(self._between(scripts.bow_height), self._between(scripts.bow))
-        return [*turns, low, self.straight(), bowed, self._posture(self._stand())]
+        return [*turns, low, self.straight(), bowed, self._posture()]
 
     def straight(self) -> Array:
         return self._walk(self._between(self.scripts.walking), 0.0, 0.0)
 
     def _walk(self, forward: float, left: float, turn: float) -> Array:
         ranges = self.ranges
-        command = self._posture(self._stand())
+        command = self._posture()
         lowest, highest = zip(ranges.velocity_x, ranges.velocity_y, ranges.yaw_rate, strict=True)
         command[:3] = np.clip((forward, left, turn), lowest, highest)
         return command
 
-    def _posture(self, command: Array) -> Array:
-        """The command, with a random posture with probability `posture_share`."""
+    def _posture(self) -> Array:
+        """Standing, in a random posture with probability `posture_share`."""
         height, pitch = self._between(self.scripts.height), self._between(self.scripts.pitch)
-        if next(self.numbers) < self.scripts.posture_share:
-            command[3:5] = height, pitch
-        return self._clipped(command)
+        if next(self.numbers) >= self.scripts.posture_share:
+            height, pitch = self.commands.nominal_height, self.commands.nominal_pitch
+        return self._stand(height, pitch)
 
     def _bow(self) -> Array:
         """A bow. Deep bows have a pitch between the upper ends of `commands.pitch` and `commands.deep_pitch`."""
@@ -103,15 +103,11 @@ class _Motions:
             command[4] = deep
         return command
 
-    def _stand(self, height: float | None = None, pitch: float | None = None) -> Array:
-        command = np.zeros(len(COMMAND))
-        command[3] = self.commands.nominal_height if height is None else height
-        command[4] = self.commands.nominal_pitch if pitch is None else pitch
-        return self._clipped(command)
-
-    def _clipped(self, command: Array) -> Array:
-        command[3] = np.clip(command[3], *self.commands.height)
-        command[4] = np.clip(command[4], *self.commands.pitch)
+    def _stand(self, height: float, pitch: float) -> Array:
+        """Standing in a posture within the commanded ranges."""
+        command = nominal_command(self.commands)
+        command[3] = np.clip(height, *self.commands.height)
+        command[4] = np.clip(pitch, *self.commands.pitch)
         return command
 
     def _between(self, ends: Range) -> float:
