@@ -139,7 +139,7 @@ def check_of(world: "Specification", workers: int) -> "QuickEvaluation":
         for trial in quick_trials(own, scene, masses, check.trials, check.seed)
     ]
     trials = trials or quick_trials(own, "lift", (0.0,), check.trials, check.seed)
-    return QuickEvaluation(own, trials, check=check, workers=min(workers, len(trials)))
+    return QuickEvaluation(own, trials, check, workers=min(workers, len(trials)))
 
 
 def _film(job: Job, training: "TeacherTraining", films: "TrainingFilms") -> None:

@@ -242,7 +242,7 @@ def test_variants_meet_the_same_trials_in_a_pinned_world(student: Path, tmp_path
 def test_the_quick_evaluation_plays_the_same_trials_again(recipe: Recipe, student: Path) -> None:
     world = Specification(recipe, robot_folder("g1"))
     trials = quick_trials(world, "lift", masses=(0.0, 4.0), count=1, seed=7)
-    with closing(QuickEvaluation(world, trials)) as evaluation:
+    with closing(QuickEvaluation(world, trials, Check())) as evaluation:
         first, second = (evaluation.play(load_policy(student)) for _ in range(2))
     assert first == second
     assert {"score", "upright", "survived", "transport", *ERRORS} <= set(first)

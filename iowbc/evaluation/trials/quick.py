@@ -38,12 +38,9 @@ def quick_trials(world: Specification, scene: str, masses: Sequence[float], coun
 class QuickEvaluation:
     """Repeated evaluation of policies on the same trials; must be closed with `close`."""
 
-    def __init__(
-        self, world: Specification, trials: Sequence[Trial], *, check: Check | None = None, workers: int = 0
-    ) -> None:
+    def __init__(self, world: Specification, trials: Sequence[Trial], check: Check, workers: int = 0) -> None:
         """`check`: see `figures`; `workers`: number of worker processes, which does not affect results; 0: none."""
-        self._check = check or Check()
-        self.world, self.trials, self.recipe = world, tuple(trials), world.recipe
+        self.world, self.trials, self._check = world, tuple(trials), check
         self._robot = load_robot(world.robot)
         episodes = [trial.episode for trial in trials]
         self._environment = VectorEnv(world, num_envs=len(episodes), workers=workers, seed=0, episodes=episodes)
@@ -57,7 +54,7 @@ class QuickEvaluation:
         """Means over all trials, see `figures`, and over those of each load: `push_30_kg/survived`, `…/E_v`."""
         outcomes = zip(self.trials, play_in(self._environment, policy), strict=True)
         rows = [
-            trial_row(self.recipe, self._robot, trial, outcome)
+            trial_row(self.world.recipe, self._robot, trial, outcome)
             | {"upright": outcome.seconds / trial.episode.duration, "load": f"{trial.case}_{trial.mass:g}_kg"}
             for trial, outcome in outcomes
         ]
