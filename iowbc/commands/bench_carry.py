@@ -19,7 +19,6 @@ from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.section import deciding
 from iowbc.results.table import ABSENT, Cell, Column, Table, heads, markdown, measured
 from iowbc.robot.description import robot_folder
-from iowbc.task.specification import Specification
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -120,7 +119,8 @@ def drake_version() -> str | None:
 
 def _play(recipe: Recipe, workers: int) -> "pd.DataFrame":
     """The trials of a suite with the controller that it names."""
-    from iowbc.evaluation.trials.protocol import Protocol, evaluated_policy, evaluated_world
+    from iowbc.evaluation.trials.protocol import Protocol
+    from iowbc.stages.eval import world_and_policy
 
     reached = 0
 
@@ -130,10 +130,9 @@ def _play(recipe: Recipe, workers: int) -> "pd.DataFrame":
             reached = int(10 * done / total)
             print(f"{recipe.name}: {done:.0f} of {total:.0f} trials, {note}", flush=True)
 
-    world = evaluated_world(Specification(recipe, robot_folder(recipe.robot)))
-    acting = evaluated_policy(world, None)
+    world, policy = world_and_policy(recipe, robot=robot_folder(recipe.robot))
     with tempfile.TemporaryDirectory(prefix="iowbc-carry-") as work:
-        return Protocol(world, acting, work=Path(work), workers=workers, progress=progress).run()
+        return Protocol(world, policy, work=Path(work), workers=workers, progress=progress).run()
 
 
 def _suite_row(file: Path, trials: "pd.DataFrame") -> str:
