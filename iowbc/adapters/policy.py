@@ -22,7 +22,7 @@ class AdaptedPolicy:
     """
 
     def __init__(self, controller: PublicController, adapter: Adapter, robot: Robot, task: Task) -> None:
-        self.adapter, self._robot = adapter, robot
+        self.adapter, self._controller, self._robot = adapter, controller, robot
         self._places = observation_layout(robot, task.observation.observe_object).slices
         self._joints = [robot.joints.index(name) for name in adapter.joints]
         support = [robot.joints[index] for index in robot.support]
@@ -31,8 +31,6 @@ class AdaptedPolicy:
         self._arms = [place for place, name in enumerate(adapter.joints) if name not in support]
         self._default = adapter.default[[adapter.joints.index(name) for name in moved]]
         self._own, self._scale = adapter.scale[self._acted], action_scale(robot, task.action)
-        self._arms_hidden = controller.arms == "default"
-        self._heading_gain = controller.heading_gain
         self._period = 1.0 / task.control_frequency
         ranges = adapter.ranges or {}
         self._bounds = np.array([ranges.get(name, (-np.inf, np.inf)) for name in VELOCITIES]).T
@@ -76,11 +74,11 @@ class AdaptedPolicy:
         position[:, robot.support] += parts["support_reference"]
         position[:, robot.interaction] += parts["arm_reference"]
         position, rates = position[:, self._joints], parts["joint_velocity"][:, self._joints]
-        if self._arms_hidden:
+        if self._controller.arms == "default":
             position[:, self._arms], rates[:, self._arms] = self.adapter.default[self._arms], 0.0
         velocity = command[:, VELOCITY].copy()
         asked = np.abs(velocity).max(axis=1) > self.adapter.standing
-        velocity[:, YAW_RATE] -= self._heading_gain * parts["heading_error"][:, 0] * asked
+        velocity[:, YAW_RATE] -= self._controller.heading_gain * parts["heading_error"][:, 0] * asked
         velocity = velocity.clip(*self._bounds)
         speed = np.maximum(np.hypot(velocity[:, 0], velocity[:, 1]), np.abs(velocity[:, YAW_RATE]))
         walking = speed > self.adapter.standing
