@@ -114,7 +114,7 @@ class DrivingPanel(ControlPanel):
 
     def _add_tabs(self, tabs: viser.GuiTabGroupHandle) -> None:
         gui, self._recipe = self._gui, self._session.source.world.recipe
-        self._request = request = self._session.request
+        request = self._session.request
         with tabs.add_tab("Command"):
             self._command = self._commands(self._recipe.task.commands)
             gui.add_button("Stand still").on_click(lambda _: self._stand())
@@ -170,11 +170,9 @@ class DrivingPanel(ControlPanel):
         wrist = np.add(commands.common_offset, commands.single_offset)
         pitch = min(commands.pitch[0], commands.deep_pitch[0]), max(commands.pitch[1], commands.deep_pitch[1])
         ranges = [commands.velocity_x, commands.velocity_y, commands.yaw_rate, commands.height, pitch]
-        start = nominal_command(commands)
         rows: list[viser.GuiSliderHandle] = []
-        for name, (low, high) in zip(COMMAND[:5], ranges, strict=True):
-            value = float(np.clip(start[len(rows)], low, high))
-            rows.append(self._gui.add_slider(LABELS[name], low, high, 0.01, value))
+        for name, (low, high), start in zip(COMMAND[:5], ranges, nominal_command(commands)[:5], strict=True):
+            rows.append(self._gui.add_slider(LABELS[name], low, high, 0.01, float(np.clip(start, low, high))))
         with self._gui.add_folder("Wrists", expand_by_default=False):
             for name, reach in zip(COMMAND[5:], np.tile(wrist, 2).tolist(), strict=True):
                 rows.append(self._gui.add_slider(f"{name.replace('_', ' ')} [m]", -reach, reach, 0.005, 0.0))
@@ -197,7 +195,7 @@ class DrivingPanel(ControlPanel):
     @property
     def conditions(self) -> PlayRequest:
         return replace(
-            self._request,
+            self._session.request,
             scene=self.scene.value,
             mass=self.mass.value,
             partner_share=self.partner_share.value,
