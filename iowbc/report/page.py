@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
-from types import MappingProxyType
 
 from iowbc.files import write_whole
 from iowbc.learning.curves import FIGURE
@@ -28,7 +27,7 @@ def write_page(
     tables: Sequence[Table],
     more_tables: Sequence[Table],
     differences: Sequence[str],
-    together: Mapping[str, bytes] = MappingProxyType({}),
+    together: Mapping[str, bytes],
 ) -> None:
     """Write the page about some runs.
 

@@ -103,7 +103,7 @@ def test_arms_of_its_own_go_to_the_posture_that_it_asks_for(file: Path, arms: st
     asked = asked.model_copy(update={"eval": asked.eval.model_copy(update={"public": public})})
     world = evaluated_world(Specification(asked, robot_folder("g1")))
     script = command_script(WALKING, world.recipe.task.commands)
-    episodes = tuple(planned_episode("lift", script, mass, 5) for mass in (0.0, 1.0))
+    episodes = tuple(planned_episode("lift", script, mass, 5, {}) for mass in (0.0, 1.0))
     environment = VectorEnv(world, num_envs=2, workers=0, seed=0, episodes=episodes)
     policy, seen = evaluated_policy(world, None), environment.reset()
     policy.reset(np.ones(2, np.bool_))
@@ -118,7 +118,7 @@ def test_arms_of_its_own_go_to_the_posture_that_it_asks_for(file: Path, arms: st
 def test_a_trial_is_the_same_whichever_it_is_played_with(file: Path) -> None:
     world = evaluated_world(Specification(recipe(file), robot_folder("g1")))
     script = command_script(WALKING, world.recipe.task.commands)
-    two = [replace(planned_episode("lift", script, 1.0, 6000 + number), duration=0.4) for number in range(2)]
+    two = [replace(planned_episode("lift", script, 1.0, 6000 + number, {}), duration=0.4) for number in range(2)]
     together = play_episodes(world, two, PolicyInBatch(evaluated_policy(world, None), 4, np.arange(2)), workers=0)
     alone = PolicyInBatch(evaluated_policy(world, None), 4, np.array([1]))
     (second,) = play_episodes(world, two[1:], alone, workers=0)

@@ -53,7 +53,7 @@ class Both:
 def driven(recipe: Recipe, robot: Robot, rg: Path, graph: ControllerGraph, exported: Path) -> Both:
     script = command_script(SEQUENCE, recipe.task.commands)
     episodes = tuple(
-        planned_episode(scene, script, mass, 3) for scene, mass in (("lift", 4.0), ("free", 0.0), ("push", 20.0))
+        planned_episode(scene, script, mass, 3, {}) for scene, mass in (("lift", 4.0), ("free", 0.0), ("push", 20.0))
     )
     environment = VectorEnv(Specification(recipe, robot.folder, rg), num_envs=3, workers=0, seed=0, episodes=episodes)
     controller = Controller.load(exported, robots=3)

@@ -286,7 +286,7 @@ def test_a_wide_table_scrolls_by_itself_and_does_not_widen_the_page(
 def written(runs: list[Run], folder: Path) -> Path:
     path = folder / "page.html"
     table, other = (Table(cell, "A caption.", heads("a", "b"), [(cell, "<2>")]) for cell in ("main", "folded"))
-    write_page(path, runs, grouped(runs), [table], [other], ["teacher.gamma: 0.99 -> 0.9"])
+    write_page(path, runs, grouped(runs), [table], [other], ["teacher.gamma: 0.99 -> 0.9"], {})
     return path
 
 

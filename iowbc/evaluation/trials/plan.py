@@ -4,7 +4,6 @@ import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
 
 from iowbc.evaluation.trials.scripts import drawn_script
 from iowbc.recipe.evaluation.evaluation import Evaluation
@@ -93,7 +92,7 @@ def planned_episode(
     script: CommandScript,
     mass: float,
     seed: int,
-    fixed: Mapping[str, float] = MappingProxyType({}),
+    fixed: Mapping[str, float],
     push: PlannedPush | None = None,
     pull: PlannedPull | None = None,
 ) -> Episode:
