@@ -1,7 +1,6 @@
 """Summary of the long table of trials: one row per variant, suite, case, mass and impulse."""
 
 from collections.abc import Mapping
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -35,7 +34,6 @@ WORLD = "trial"
 """Column that identifies the world. Trials of one number have the same random draws and commands at every mass, in
 every suite and with every training; intervals treat them as one cluster."""
 GROUP = ["variant", "kind", "suite", "case", "mass", "impulse"]
-NO_LABELS: Mapping[str, str] = MappingProxyType({})
 
 
 def case_names(rows: pd.DataFrame) -> "pd.Series[str]":
@@ -44,7 +42,7 @@ def case_names(rows: pd.DataFrame) -> "pd.Series[str]":
     return rows["case"].where(suites == 1, rows["suite"] + " " + rows["case"])
 
 
-def aggregate(trials: pd.DataFrame, labels: Mapping[str, str] = NO_LABELS) -> pd.DataFrame:
+def aggregate(trials: pd.DataFrame, labels: Mapping[str, str] | None = None) -> pd.DataFrame:
     """One row per combination of `GROUP`, by suite and case in order of appearance, mass, impulse, and the paper's
     order of variants. labels: the paper's names of variants with another name here.
 
@@ -63,7 +61,7 @@ def aggregate(trials: pd.DataFrame, labels: Mapping[str, str] = NO_LABELS) -> pd
     metrics = [name for name in numbers if not name.startswith("drawn_")]
     groups = trials.groupby(GROUP, sort=False)
     table = pd.DataFrame([_row(dict(zip(GROUP, key, strict=True)), group, metrics) for key, group in groups])
-    table["name_in_paper"] = table["variant"].replace(dict(labels))
+    table["name_in_paper"] = table["variant"].replace(dict(labels or {}))
     ranks = {name: list(dict.fromkeys(trials[name])) for name in ("suite", "case")} | {"variant": variants_of(trials)}
     order = ["suite", "case", "mass", "impulse", "variant"]
     return table.sort_values(

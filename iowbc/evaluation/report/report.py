@@ -5,14 +5,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from iowbc.evaluation.report.aggregate import (
-    NO_LABELS,
-    TRAINING,
-    aggregate,
-    stepping_commanded,
-    suites_of,
-    with_trainings,
-)
+from iowbc.evaluation.report.aggregate import TRAINING, aggregate, stepping_commanded, suites_of, with_trainings
 from iowbc.evaluation.report.capacity import capacity_table, push_table
 from iowbc.evaluation.report.compliance import compliance_figure, compliance_table, impedance_table
 from iowbc.evaluation.report.differences import difference_table
@@ -26,7 +19,7 @@ from iowbc.results.table import Table, write_table
 
 
 def write_report(
-    trials: pd.DataFrame, folder: Path, capacity_rate: float, labels: Mapping[str, str] = NO_LABELS
+    trials: pd.DataFrame, folder: Path, capacity_rate: float, labels: Mapping[str, str] | None = None
 ) -> pd.DataFrame:
     """Write `tables/` and `figures/` under `folder`; returns the summary, see `aggregate`.
 
