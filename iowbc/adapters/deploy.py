@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from iowbc.adapters.adapter import Adapter, Term, scaled
+from iowbc.adapters.adapter import Adapter, Term
 from iowbc.adapters.networks import network
 from iowbc.arrays import Array
 from iowbc.errors import StageFailed
@@ -82,9 +82,7 @@ def _term(name: str, said: Mapping[str, Any]) -> Term:
     if name not in FIELDS or said.get("params", {}).get("asset_cfg"):
         raise ValueError(f"the observation {name!r} is not read; there are: {', '.join(FIELDS)}")
     factor: Array = np.array(1.0 if said.get("scale") is None else said["scale"], np.float64)
-    if said.get("clip") is None:
-        return scaled(FIELDS[name], factor)
-    low, high = said["clip"]
+    low, high = (-np.inf, np.inf) if said.get("clip") is None else said["clip"]
     return lambda seen: getattr(seen, FIELDS[name]).clip(low, high) * factor
 
 
