@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from html import escape
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -38,16 +39,11 @@ class Curve:
     """A line with a band; unknown values are NaN."""
 
     label: str
-    place: int
-    """Index of its group, which sets the colour."""
+    colour: str
     across: Values
     mean: Values
     low: Values
     high: Values
-
-    @property
-    def colour(self) -> str:
-        return COLOURS[self.place % len(COLOURS)]
 
     @property
     def banded(self) -> NDArray[np.bool_]:
@@ -103,10 +99,10 @@ def learning_panels(
     first = STAGES[stage].curves
     panels = {name: CurvePanel(title_of(name)) for name in dict.fromkeys([*first, *names]) if name in names}
     for name, panel in panels.items():
-        for place, (group, runs) in enumerate(zip(groups, found, strict=True)):
+        for colour, group, runs in zip(cycle(COLOURS), groups, found, strict=False):
             having = [columns for columns in runs if name in columns]
             curves = [_thinned(columns["step"] / 1e6, columns[name], most_points) for columns in having]
-            panel.curves += [Curve(group.label, place, *_joined(curves))] if curves else []
+            panel.curves += [Curve(group.label, colour, *_joined(curves))] if curves else []
     main = [panel for name, panel in panels.items() if name in first]
     return main, [panel for name, panel in panels.items() if name not in first]
 
@@ -114,14 +110,14 @@ def learning_panels(
 def evaluation_panels(groups: Sequence[Group]) -> list[CurvePanel]:
     """Success and errors over the mass, for each suite that sweeps it."""
     panels: dict[tuple[str, str], CurvePanel] = {}
-    for place, group in enumerate(groups):
+    for colour, group in zip(cycle(COLOURS), groups, strict=False):
         found = [_suites(run.artifacts["eval"].folder) for run in group.runs if "eval" in run.artifacts]
         for suite in dict.fromkeys(suite for suites in found for suite in suites):
             for name, title in ERRORS.items():
                 curves = [suites[suite][name] for suites in found if suite in suites]
                 joined = _joined([curve[:2] for curve in curves]) if len(curves) > 1 else curves[0]
                 new = CurvePanel(f"{suite}: {title}", across="mass [kg]", mode="lines+markers", from_zero=True)
-                panels.setdefault((suite, name), new).curves.append(Curve(group.label, place, *joined))
+                panels.setdefault((suite, name), new).curves.append(Curve(group.label, colour, *joined))
     return list(panels.values())
 
 
