@@ -11,7 +11,8 @@ import pytest
 
 from iowbc.errors import UsageError
 from iowbc.recipe.beside import MeshFile
-from iowbc.recipe.simulation.scene import Object, Scene, Size
+from iowbc.recipe.section import Vector
+from iowbc.recipe.simulation.scene import Object, Scene
 from iowbc.recipe.simulation.simulation import SimulationSettings as Recipe
 from iowbc.robot.description import GRAVITY
 from iowbc.sim.shapes import measured
@@ -85,7 +86,7 @@ def with_scene(recipe: Recipe, scene: Scene) -> Recipe:
     return recipe.model_copy(update={"scenes": scenes})
 
 
-CYLINDER: Size = (0.3, 0.3, 0.4)
+CYLINDER: Vector = (0.3, 0.3, 0.4)
 
 
 @pytest.mark.parametrize("shape", ["cylinder", "mesh"])
