@@ -50,8 +50,8 @@ def run(job: Job) -> None:
     from iowbc.control.action import action_mirror
     from iowbc.control.observation import observation_layout
     from iowbc.learning.computing import prepare_process
-    from iowbc.learning.distillation import Rows, StudentTraining
     from iowbc.learning.storage import load_network, require_layout, save_network
+    from iowbc.learning.student import Rows, StudentTraining
     from iowbc.robot.description import load_robot
     from iowbc.robot.mirror import side_by_side
     from iowbc.stages.environments import training_environments

@@ -10,7 +10,7 @@ from iowbc.recipe.recipe import Recipe
 
 if TYPE_CHECKING:
     from iowbc.learning.curves import Curves
-    from iowbc.learning.distillation import StudentTraining
+    from iowbc.learning.student import StudentTraining
     from iowbc.learning.teacher import TeacherTraining
     from iowbc.skill.learner import SkillTraining
 

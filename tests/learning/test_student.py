@@ -10,9 +10,10 @@ import torch
 from mirrored import mirror_tensor
 from point_masses import MIRRORS, PointMasses
 
-from iowbc.learning.distillation import DistillationLoss, Rows, StudentTraining, Symmetry
+from iowbc.learning.distillation import DistillationLoss, Symmetry
 from iowbc.learning.networks import StudentNetwork, TeacherNetwork, mirror_as_json
 from iowbc.learning.storage import load_network, save_network
+from iowbc.learning.student import Rows, StudentTraining
 from iowbc.recipe.distillation import Distillation
 from iowbc.robot.mirror import MirrorMap
 
