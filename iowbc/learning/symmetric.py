@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.autograd import Function
 
@@ -33,7 +32,7 @@ class MirrorBasis(nn.Module):
         super().__init__()
         even, odd = _eigenvectors(mirror)
         self.even, self.odd = len(even), len(odd)
-        matrix = torch.from_numpy(np.concatenate([even, odd]).T.astype(np.float32, order="C"))
+        matrix = torch.from_numpy(np.stack([*even, *odd], axis=1).astype(np.float32))
         self.register_buffer("matrix", matrix, persistent=False)
 
     def forward(self, x: Tensor) -> Tensor:
@@ -49,16 +48,21 @@ class MirrorBasis(nn.Module):
         return torch.cat([even, odd], dim=-1) @ self.matrix.T
 
 
-def _eigenvectors(mirror: MirrorMap) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Orthonormal eigenvectors of the mirror with eigenvalue +1, and those with -1, in rows."""
+def _eigenvectors(mirror: MirrorMap) -> tuple[list[Any], list[Any]]:
+    """Orthonormal eigenvectors of the mirror with eigenvalue +1, and those with -1."""
     permutation, sign = mirror.permutation, np.asarray(mirror.sign, np.float64)
-    places, unit = np.arange(len(sign)), np.eye(len(sign))
-    if np.any(permutation[permutation] != places) or np.any(sign != sign[permutation]):
+    if np.any(permutation[permutation] != np.arange(len(sign))) or np.any(sign != sign[permutation]):
         raise ValueError(f"a mirror is its own inverse; this map is not: {permutation.tolist()}, {sign.tolist()}")
-    alone, first, image = permutation == places, permutation > places, sign[:, None] * unit[permutation]
-    length = np.where(alone, 2.0, np.sqrt(2.0))[:, None]
-    even, odd = (unit + image) / length, (unit - image) / length
-    return even[first | (alone & (sign > 0))], odd[first | (alone & (sign < 0))]
+    unit = np.eye(len(sign))
+    even: list[Any] = []
+    odd: list[Any] = []
+    for place, other in enumerate(permutation.tolist()):
+        if other == place:
+            (even if sign[place] > 0 else odd).append(unit[place])
+        elif other > place:
+            even.append((unit[place] + sign[place] * unit[other]) / np.sqrt(2.0))
+            odd.append((unit[place] - sign[place] * unit[other]) / np.sqrt(2.0))
+    return even, odd
 
 
 class PairedActivation(nn.Module):

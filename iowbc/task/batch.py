@@ -16,11 +16,11 @@ from iowbc.robot.description import load_robot
 from iowbc.sim.simulation import Simulation
 from iowbc.task.endings import Ending
 from iowbc.task.episode_state import PER_ENVIRONMENT_FIELDS, EpisodeState
-from iowbc.task.episodes import PlannedPulls, PlannedPushes
 from iowbc.task.guidance import Guidance
 from iowbc.task.judge import Judge, Judgement
 from iowbc.task.layout import full_layout
 from iowbc.task.motion import Motion
+from iowbc.task.planned_pushes import PlannedPulls, PlannedPushes
 from iowbc.task.privileged import Truth
 from iowbc.task.record import statistics
 from iowbc.task.record.signals import Recorded, write_signals
