@@ -92,7 +92,8 @@ def play(
         from iowbc.skill.single_game import SingleGame
 
         world, student, robot, task = playable_skill(store, skill, scene)
-        recipe, human = skill.manifest.recipe, PERSON if page else _human(world.recipe.skill.partners, partner)
+        recipe = skill.manifest.recipe
+        human = _human(world.recipe.skill.partners, partner) if page is None else PERSON
         first = Plan(task, human, known=False, mass=mass, share=partner_share, seed=seed)
         if page is None:
             with closing(SingleGame(world, student, NOMINAL | {ROBOT: robot}, first)) as game:

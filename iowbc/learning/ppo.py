@@ -55,7 +55,8 @@ class Learner:
         value_only: Sequence[int] = (),
         device: str = "cpu",
     ) -> None:
-        """The arguments are those of `TeacherTraining`."""
+        """`mirrors`: of observation and action; `cores`: for network updates; `value_only`: indices of observations
+        for the value network only; `device`: torch device of the networks."""
         set_random_seed(seed)
         self.settings, self.env, self.device = teacher, env, torch.device(device)
         self._on_cpu = self.device.type == "cpu"

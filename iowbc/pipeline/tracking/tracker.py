@@ -72,7 +72,7 @@ class RunRecord:
         self._journal.write("metrics", id=name, values=cleaned, step=step)
 
     def close(self, status: str, *, wait: bool = True) -> bool:
-        """End the run with MLflow's status and let the sender take what is left; True where MLflow has everything."""
+        """End the run with MLflow's status and let the sender deliver the rest. Returns True if MLflow has all."""
         if self._open is None:
             return True
         path = self._open.path
