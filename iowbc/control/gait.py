@@ -20,13 +20,22 @@ def wants_to_move(command: Array, gait: GaitPrior) -> Mask:
     return (speed > gait.moving_speed) | (xp.abs(command[:, 2]) > gait.moving_yaw_rate)
 
 
-def is_falling(measured: Measured, pelvis_pitch: Array, recovery: Recovery) -> Mask:
-    """True where the base is tipping over, (n,), by pitch and roll of the measured gravity, less the reference's, and
-    their rates by the gyroscope; `pelvis_pitch` of the reference posture (n,) [rad]."""
+def mean_tilt(before: Array, measured: Measured, pelvis_pitch: Array, recovery: Recovery, dt: float) -> Array:
+    """Mean over `filter_time` of the base's tilt extrapolated over `horizon`, pitch and roll, a control period `dt` [s]
+    later, (n, 2) [rad]: the measured gravity's, less the reference's, and their rates by the gyroscope.
+
+    `before`: the mean until now, (n, 2) [rad]; `pelvis_pitch` of the reference posture (n,) [rad].
+    """
     xp, gravity, rate = namespace(pelvis_pitch), measured.projected_gravity, measured.base_angular_velocity
     pitch = gravity[:, 0] - xp.sin(pelvis_pitch) + recovery.horizon * rate[:, 1]
     roll = -gravity[:, 1] + recovery.horizon * rate[:, 0]
-    return pitch * pitch + roll * roll > recovery.tilt**2
+    kept = recovery.filter_time / (recovery.filter_time + dt)
+    return kept * before + (1.0 - kept) * xp.stack([pitch, roll], 1)
+
+
+def is_falling(tilt: Array, recovery: Recovery) -> Mask:
+    """True where the base is tipping over, (n,), by its mean tilt (n, 2) [rad]."""
+    return (tilt * tilt).sum(1) > recovery.tilt**2
 
 
 def foot_phase(phase: Array) -> Array:

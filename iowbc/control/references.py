@@ -27,8 +27,10 @@ def both_wrists(left: tuple[float, float, float]) -> Array:
     return np.stack([np.array(left), VECTOR_SIGN * np.array(left)])
 
 
-STRETCH, TURN = 3, 4
-"""Places of the stretch of the legs and the turn of the hips in the feedback, after the offsets of the feet."""
+FEET, STRETCH, TURN, TILT = slice(0, 3), slice(3, 4), slice(4, 5), slice(5, 7)
+"""Places in the feedback: forward offsets of left foot, right foot and both [m], stretch of both legs [m], turn of both
+hips [rad], and mean tilt of the base, pitch and roll [rad]."""
+FEEDBACK_SIZE = 7
 
 
 class ReferenceLayer(Constants):
@@ -113,7 +115,7 @@ class ReferenceLayer(Constants):
             pitch = self.start_pitch(support, command)
             support = self._stride(support, pitch, command, phase, 1.0 * stepping, feedback)
         if self._hips is not None and feedback is not None:
-            support = self._hips.turned(support, feedback[:, TURN:])
+            support = self._hips.turned(support, feedback[:, TURN])
         return support
 
     def pace(
@@ -126,22 +128,24 @@ class ReferenceLayer(Constants):
         command: Array,
         dt: float,
     ) -> tuple[Array, Mask, Array]:
-        """Gait phase (n,), whether the clock runs (n,), and feedback (n, 5) one control period later: offset of left
-        foot, right foot and both, stretch of both legs [m], turn of both hips [rad].
+        """Gait phase (n,), whether the clock runs (n,), and feedback (n, 7) one control period later.
 
         The clock runs for a commanded velocity, or to catch a fall."""
+        feet, stretch, turn, tilt = feedback[:, FEET], feedback[:, STRETCH], feedback[:, TURN], feedback[:, TILT]
         moving, recovery = gait.wants_to_move(command, self._settings), self._settings.recovery
         if recovery is not None:
-            moving = moving | gait.is_falling(measured, self.start_pitch(support, command), recovery)
+            pitch = self.start_pitch(support, command)
+            pitch = pitch - turn[:, 0] if recovery.turned else pitch
+            tilt = gait.mean_tilt(tilt, measured, pitch, recovery, dt)
+            moving = moving | gait.is_falling(tilt, recovery)
         phase, stepping = gait.advance(phase, stepping, moving, self._settings, dt)
-        feet, stretch, turn = feedback[:, :STRETCH], feedback[:, STRETCH:TURN], feedback[:, TURN:]
         if self._placement is not None:
             feet = self._placement(feet, measured, command, phase, 1.0 * stepping, dt)
         if self._legs is not None:
             stretch = self._legs(stretch, measured, command, dt)
         if self._hips is not None:
             turn = self._hips(turn, measured, command, dt)
-        return phase, stepping, namespace(feedback).concatenate([feet, stretch, turn], -1)
+        return phase, stepping, namespace(feedback).concatenate([feet, stretch, turn, tilt], -1)
 
     def pelvis_pitch(self, support: Array, command: Array) -> Array:
         """Pelvis pitch of the reference posture, (n,) [rad]: the torso's less the waist's."""

@@ -4,6 +4,7 @@ import numpy as np
 
 from iowbc.arrays import Indices
 from iowbc.control.command import COMMAND
+from iowbc.control.references import FEEDBACK_SIZE
 from iowbc.task.curriculum import AXES
 from iowbc.task.rewards.table import TRACKED
 
@@ -55,9 +56,8 @@ class EpisodeState:
         """Gait phase, (n,)."""
         self.stepping = np.zeros(n, np.bool_)
         """True where the gait clock runs, (n,)."""
-        self.feedback = np.zeros((n, 5))
-        """Forward offset of left foot, right foot and both from their places in the stride, stretch of both legs [m],
-        and turn of both hips [rad], (n, 5)."""
+        self.feedback = np.zeros((n, FEEDBACK_SIZE))
+        """Feedback of the references, (n, 7); see `iowbc.control.references`."""
         self.arms = np.zeros((n, arms))
         """θ_I_ref, (n, 14) [rad]."""
         self.posture = np.zeros((n, support))

@@ -11,9 +11,10 @@ from task_worlds import QUIET, rollout, same
 from iowbc.control.command import HEIGHT, OFFSET, PITCH, nominal_command
 from iowbc.control.feasible_map import FeasibleMap
 from iowbc.control.generator import ReferenceNetwork
-from iowbc.control.references import ReferenceLayer, both_wrists
+from iowbc.control.references import FEEDBACK_SIZE, TURN, ReferenceLayer, both_wrists
+from iowbc.control.sensors import Measured
 from iowbc.recipe.recipe import Recipe
-from iowbc.recipe.task.joint_references import ArmReference, GaitPrior, References
+from iowbc.recipe.task.joint_references import ArmReference, GaitPrior, Recovery, References, TorsoFeedback
 from iowbc.robot.description import Robot
 from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv
@@ -190,3 +191,18 @@ def test_motors_follow_a_share_of_the_previous_action(make: Make, robot: Robot) 
     assert still == pytest.approx(0.0, abs=1e-12)
     moved = batch.targets(np.ones((2, 15)))[:, robot.support] - batch.memory.support
     assert moved == pytest.approx(np.tile(robot.action_scale, (2, 1)))
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_pelvis_that_the_hips_turn_back_is_falling_unless_this_is_known(robot: Robot, *, turned: bool) -> None:
+    recovery = Recovery(tilt=0.1, turned=turned)
+    layer = ReferenceLayer(robot, References(gait=GaitPrior(recovery=recovery), torso=TorsoFeedback()), None)
+    asked, rest = command(), np.zeros(1)
+    feedback = np.zeros((1, FEEDBACK_SIZE))
+    feedback[:, TURN] = 0.15
+    back = np.array([[np.sin(-0.15), 0.0, -np.cos(0.15)]])
+    joints = np.zeros((1, len(robot.joints)))
+    measured = Measured(back, np.zeros((1, 3)), np.zeros((1, 1)), joints, joints)
+    support = layer.support(layer.default_arms[None], asked)
+    _, stepping, _ = layer.pace(rest, rest > 0.0, feedback, measured, support, asked, 0.02)
+    assert bool(stepping) is not turned
