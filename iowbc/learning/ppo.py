@@ -19,6 +19,7 @@ from stable_baselines3.common.utils import set_random_seed
 from torch import Tensor
 
 from iowbc.arrays import Array
+from iowbc.learning.advantages import drawn_leaders, without_common_part
 from iowbc.learning.as_numpy import acting_policy
 from iowbc.learning.checkpoint import Arrays, module_arrays, restore_module
 from iowbc.learning.computing import ParallelBatch, reduced
@@ -28,7 +29,7 @@ from iowbc.learning.networks import Mirrors, mirrors_as_json
 from iowbc.learning.normalization import Normalization
 from iowbc.learning.perceptron import Perceptron
 from iowbc.learning.policy import ActorCritic, acting_part
-from iowbc.learning.rollout import Samples, drawn_leaders, without_common_part
+from iowbc.learning.rollout import Samples
 from iowbc.recipe.skill.skill import SkillLearning
 from iowbc.recipe.teacher import Teacher
 from iowbc.rollouts.blocks import block_size
