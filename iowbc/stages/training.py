@@ -4,7 +4,7 @@ import time
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
-from iowbc.errors import Interrupted
+from iowbc.errors import Interrupted, StageFailed
 from iowbc.pipeline.stage import Job
 from iowbc.recipe.recipe import Recipe
 
@@ -38,20 +38,26 @@ def train(
     """Train from the job's checkpoint, from its predecessor's end, or from scratch; returns the curves.
 
     `checkpoint_every`: updates between two checkpoints; `note`: text of the progress, from an update's metrics; `look`:
-    called after each update. Raises Interrupted, after writing a checkpoint, once a stop is requested.
+    called after each update. Raises Interrupted, after writing a checkpoint, once a stop is requested, and
+    StageFailed if the state is of another version.
     """
     from safetensors.numpy import load_file
 
     from iowbc.learning.checkpoint import load_checkpoint, save_checkpoint
     from iowbc.learning.curves import TABLE, Curves
 
-    path = job.work / "training.checkpoint"
+    path = source = job.work / "training.checkpoint"
     found, origin = load_checkpoint(path, job.key, job.report.say), "resumed from its checkpoint"
     if found is None and job.predecessor is not None:
-        found, origin = load_file(job.predecessor / STATE), "goes on from a finished training"
+        source = job.predecessor / STATE
+        found, origin = load_file(source), "goes on from a finished training"
         Curves.restore(job.predecessor / TABLE, job.work / CURVES)
     if found is not None:
-        training.restore(found)
+        try:
+            training.restore(found)
+        except (KeyError, ValueError) as error:
+            text = f"written by another version of iowbc ({error}); go on with that version, or remove its folder"
+            raise StageFailed(f"{source}: {text} to train anew") from error
         job.report.say(f"{origin} at {training.steps:,} of {training.planned:,} steps")
     curves = Curves(job.work / CURVES, training.steps)
     updates = 0

@@ -22,9 +22,10 @@ from stage_jobs import Backwards, make_job
 from training_jobs import ENVIRONMENTS, rows, small_recipe, stopped_and_resumed
 
 from iowbc.control.action import action_mirror
-from iowbc.errors import StageFailed
+from iowbc.errors import Interrupted, StageFailed
 from iowbc.evaluation.trials.plan import command_script
 from iowbc.learning.acting import StudentPolicy, load_policy, policy_of
+from iowbc.learning.checkpoint import load_checkpoint, save_checkpoint
 from iowbc.learning.storage import load_network, load_teacher
 from iowbc.recipe.evaluation.sequences import LIFTING, PUSHING
 from iowbc.recipe.execution import Execution
@@ -61,6 +62,20 @@ def test_a_teacher_that_was_stopped_and_resumed_is_the_unbroken_one_bit_for_bit(
     for name in ("teacher.safetensors", "teacher.json"):
         assert (tmp_path / "out" / name).read_bytes() == (trained / "teacher" / "out" / name).read_bytes(), name
     assert rows(tmp_path / "work") == rows(trained / "teacher" / "work")
+
+
+def test_a_checkpoint_of_environments_with_another_state_is_refused_and_stays(tmp_path: Path) -> None:
+    with pytest.raises(Interrupted):
+        teacher.STAGE.run(make_job(tmp_path, small_recipe(), workers=0, interrupted=lambda: True))
+    job = make_job(tmp_path, small_recipe(), workers=0)
+    path = tmp_path / "work" / "training.checkpoint"
+    arrays = load_checkpoint(path, job.key, print)
+    assert arrays is not None
+    save_checkpoint(path, job.key, arrays | {"environment/task/feedback": np.zeros((4, 5))})
+    before = path.read_bytes()
+    with pytest.raises(StageFailed, match=r"training.checkpoint: written by another version.*'task/feedback'.*remove"):
+        teacher.STAGE.run(job)
+    assert path.read_bytes() == before
 
 
 def test_rollouts_by_other_machines_that_are_lost_all_the_time_change_nothing(trained: Path, tmp_path: Path) -> None:

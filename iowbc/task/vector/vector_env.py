@@ -180,7 +180,10 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
         return join(self._read(Batch.snapshot)) | {"statistics": self._statistics.carried.copy()}
 
     def restore(self, state: Mapping[str, Array]) -> None:
-        """Inverse of `state`: the environments then continue bit for bit."""
+        """Inverse of `state`: the environments then continue bit for bit. Raises ValueError if it is of others."""
+        for name, values in self.state().items():
+            if name not in state or state[name].shape != values.shape:
+                raise ValueError(f"environments have another '{name}'")
         own = dict(state)
         self._statistics.carried[:] = own.pop("statistics")
         parts = split(own, [self._scenes[first:last] for first, last in self.workers.groups])
