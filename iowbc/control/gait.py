@@ -4,7 +4,7 @@ import numpy as np
 
 from iowbc.arrays import Array, Mask, namespace
 from iowbc.control.sensors import Measured
-from iowbc.recipe.task.joint_references import GaitPrior, Recovery
+from iowbc.recipe.task.joint_references import GaitPrior, PostureSteps, Recovery
 from iowbc.robot.mirror import in_place
 
 TINY = 1e-6
@@ -18,6 +18,11 @@ def wants_to_move(command: Array, gait: GaitPrior) -> Mask:
     xp = namespace(command)
     speed = xp.sqrt(command[:, 0] ** 2 + command[:, 1] ** 2)
     return (speed > gait.moving_speed) | (xp.abs(command[:, 2]) > gait.moving_yaw_rate)
+
+
+def changes_posture(change: Array, posture: PostureSteps) -> Mask:
+    """True where the commanded posture has changed recently, (n,), by height [m] and pitch [rad], (n, 2)."""
+    return (abs(change[:, 0]) > posture.height) | (abs(change[:, 1]) > posture.pitch)
 
 
 def mean_tilt(before: Array, measured: Measured, pelvis_pitch: Array, recovery: Recovery, dt: float) -> Array:

@@ -36,9 +36,10 @@ class State:
     stepping: Annotated[Array, "1", "-", "1 while the gait clock runs, else 0"]
     feedback: Annotated[
         Array,
-        "m, m, m, m, rad, rad, rad",
+        "m, m, m, m, rad, rad, rad, m, rad",
         "heading",
-        "forward offset of left foot, right foot and both; stretch of both legs; turn of both hips; mean pitch, roll",
+        "forward offset of left foot, right foot and both; stretch of both legs; turn of both hips; mean pitch and roll "
+        "of the tilt; recent change of the commanded height and pitch",
     ]
     begun: Annotated[Array, "1", "-", "0 in the state that settle.onnx makes, 1 afterwards"]
     action: Annotated[Array, "action", "joint", "residual action of the policy, clipped, support order"]
@@ -119,7 +120,7 @@ class ControlStep(Constants):
         posture = self.references.support(arms, command)
         before, ran = state.phase[:, 0], state.stepping[:, 0] > 0.5
         phase, runs, feedback = self.references.pace(
-            before, ran, state.feedback, measured, posture, command, self._period
+            before, ran, state.feedback, measured, posture, command, state.command, self._period
         )
         phase, feedback = xp.where(begun[:, 0], phase, before), xp.where(begun, feedback, state.feedback)
         stepping = (begun[:, 0] & runs) | (~begun[:, 0] & ran)

@@ -57,7 +57,7 @@ class EpisodeState:
         self.stepping = np.zeros(n, np.bool_)
         """True where the gait clock runs, (n,)."""
         self.feedback = np.zeros((n, FEEDBACK_SIZE))
-        """Feedback of the references, (n, 7); see `iowbc.control.references`."""
+        """Feedback of the references, (n, 9); see `iowbc.control.references`."""
         self.arms = np.zeros((n, arms))
         """θ_I_ref, (n, 14) [rad]."""
         self.posture = np.zeros((n, support))

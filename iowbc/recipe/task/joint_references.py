@@ -86,6 +86,18 @@ class Recovery(Section):
     turns by 0.15 rad, always steps."""
 
 
+class PostureSteps(Section):
+    """Steps while the commanded posture changes: a robot that bows or rises on resting feet falls after a push."""
+
+    time: float = Field(default=0.4, gt=0.0)
+    """Time over which changes of the command count [s]; they decay exponentially."""
+    pitch: float = Field(default=0.05, gt=0.0)
+    """Change of the torso pitch at which the clock starts [rad]: after 0.1 s at 0.5 rad/s. It stops 0.55 s after such a
+    motion ends."""
+    height: float = Field(default=0.015, gt=0.0)
+    """The same of the height [m], at 0.15 m/s."""
+
+
 class Placement(Section):
     """Feedback of the estimated forward speed on footholds: a robot that is pushed ahead steps further ahead, and one
     that lags pushes from further behind."""
@@ -164,6 +176,8 @@ class GaitPrior(Section):
     """Commanded yaw rate above which the clock runs [rad/s]."""
     recovery: Recovery | None = Field(default=None, json_schema_extra=LATER)
     """Recovery steps while standing, after a push; empty: the clock depends on the command only."""
+    posture: PostureSteps | None = Field(default=None, json_schema_extra=LATER)
+    """Steps while the commanded posture changes; empty: none."""
     placement: Placement | None = Field(default=None, json_schema_extra=LATER)
     """Feedback of the estimated forward speed on footholds; empty: none."""
 
