@@ -38,8 +38,8 @@ class State:
         Array,
         "m, m, m, m, rad, rad, rad, m, rad",
         "heading",
-        "forward offset of left foot, right foot and both; stretch of both legs; turn of both hips; mean pitch and roll "
-        "of the tilt; recent change of the commanded height and pitch",
+        "forward offset of left foot, right foot and both; stretch of both legs; turn of both hips; mean tilt (pitch, "
+        "roll); recent change of the commanded height and pitch",
     ]
     begun: Annotated[Array, "1", "-", "0 in the state that settle.onnx makes, 1 afterwards"]
     action: Annotated[Array, "action", "joint", "residual action of the policy, clipped, support order"]
