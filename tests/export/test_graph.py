@@ -34,6 +34,7 @@ def random_inputs(graph: ControllerGraph, rows: int, seed: int = 0) -> Values:
     state = {name: random.normal(size=(rows, *shape)) for name, shape in graph.equations.shapes.items()}
     state |= {name: random.integers(0, 2, (rows, 1)) for name in ("stepping", "begun")}
     state |= {"phase": random.uniform(size=(rows, 1)), "command": 0.3 * state["command"]}
+    state["feedback"] *= 0.2  # feet within their reach, beyond which the stride amplifies rounding
     inputs["state"] = np.concatenate([part.reshape(rows, -1) for part in state.values()], axis=1).astype(np.float32)
     inputs["command"] *= np.float32(0.3)
     if "object_quaternion" in inputs:

@@ -181,12 +181,13 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
 
     def restore(self, state: Mapping[str, Array]) -> None:
         """Inverse of `state`: the environments then continue bit for bit. Raises ValueError if it is of others."""
+        own = dict(state)
+        carried = own.pop("statistics")
+        parts = split(own, [self._scenes[first:last] for first, last in self.workers.groups])
         for name, values in self.state().items():
             if name not in state or state[name].shape != values.shape:
                 raise ValueError(f"environments have another '{name}'")
-        own = dict(state)
-        self._statistics.carried[:] = own.pop("statistics")
-        parts = split(own, [self._scenes[first:last] for first, last in self.workers.groups])
+        self._statistics.carried[:] = carried
         self.workers.call([Message(Batch.restore, (part,)) for part in parts])
         self._reset_seeds()
 
