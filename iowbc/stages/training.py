@@ -56,8 +56,8 @@ def train(
         try:
             training.restore(found)
         except (KeyError, ValueError) as error:
-            text = f"written by another version of iowbc ({error}); go on with that version, or remove its folder"
-            raise StageFailed(f"{source}: {text} to train anew") from error
+            remedy = "go on with that version, or remove its folder to train anew"
+            raise StageFailed(f"{source}: written by another version of iowbc ({error}); {remedy}") from error
         job.report.say(f"{origin} at {training.steps:,} of {training.planned:,} steps")
     curves = Curves(job.work / CURVES, training.steps)
     updates = 0

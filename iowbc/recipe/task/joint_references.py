@@ -78,9 +78,8 @@ class Recovery(Section):
     """Time over which the tilt is extrapolated at the measured rate [s]: sqrt(h / g) of a pelvis at 0.7 m, so that the
     sum is the capture point's angle."""
     filter_time: float = Field(default=0.0, ge=0.0, json_schema_extra=LATER)
-    """Averaging time of the tilt [s]. Without it, noise of the gyroscope starts the clock, and touchdowns, at which the
-    clock may stop, keep it running: at 0.15 rad a robot that should stand steps for 94 % of the time, with 0.06 s
-    for 18 %."""
+    """Averaging time of the tilt [s]. Without it, brief rates start the clock, and touchdowns, at which it may stop,
+    keep it running: at 0.15 rad a robot that should stand steps for 94 % of the time, with 0.06 s for 18 %."""
     turned: bool = Field(default=False, json_schema_extra=LATER)
     """Measure the tilt from the pelvis as the torso's feedback turns it. Otherwise a robot with 8 kg, whose pelvis it
     turns by 0.15 rad, always steps."""
