@@ -17,7 +17,7 @@ from still import Still
 
 from iowbc.control.sensors import Measured
 from iowbc.deploy.controller import Controller
-from iowbc.onboard import messages
+from iowbc.onboard import messages, process
 from iowbc.onboard.machine import OperatorRequest, State
 from iowbc.onboard.messages import Record
 from iowbc.onboard.process import LockStep, drive
@@ -50,16 +50,28 @@ def ends(domain: int) -> Iterator[tuple[DdsBus, DdsBus]]:
         bus.close()
 
 
+def connect(sender: DdsBus, receiver: DdsBus, kind: np.dtype[np.void]) -> None:
+    """Returns when the receiver hears the sender and no message sent for this is left on the way."""
+    receiver.take(kind)
+    message = messages.empty(kind)
+    sender.publish(message)
+    while not receiver.wait(kind, 0.1):
+        sender.publish(message)
+    message["reserve"] = 1
+    sender.publish(message)
+    while not any(arrived["reserve"].any() for arrived in receiver.take(kind)):
+        receiver.wait(kind, 0.1)
+
+
 def test_messages_cross_and_nobody_receives_its_own(ends: tuple[DdsBus, DdsBus]) -> None:
     robot, program = ends
+    program.take(messages.LOW_COMMAND)
+    connect(program, robot, messages.LOW_COMMAND)
     command = messages.empty(messages.LOW_COMMAND)
     command["motor_cmd"]["q"][3] = 0.25
-    for _ in range(100):
-        program.take(messages.LOW_COMMAND)
-        program.publish(command)
-        if robot.wait(messages.LOW_COMMAND, 0.1):
-            break
-    (arrived,) = robot.take(messages.LOW_COMMAND)[-1:]
+    program.publish(command)
+    robot.wait(messages.LOW_COMMAND, 10.0)
+    (arrived,) = robot.take(messages.LOW_COMMAND)
     assert arrived.tobytes() == command.tobytes()
     assert program.take(messages.LOW_COMMAND) == []
 
@@ -115,6 +127,10 @@ class Rollout:
         seen = Measured(**{name: self.inputs[name][step : step + 1].astype(np.float64) for name in names})
         return low_state(0, seen, np.zeros(29))
 
+    @property
+    def ended(self) -> bool:
+        return self.run >= 10 * STEPS or self.turns >= 5000
+
     @staticmethod
     def _step(turn: int) -> int:
         return min(turn // 10, STEPS - 1)
@@ -138,27 +154,27 @@ class Rollout:
 
 
 def test_a_golden_rollout_over_the_bus_equals_the_one_without(
-    ends: tuple[DdsBus, DdsBus], still: Still, blind: Path, tmp_path: Path
+    ends: tuple[DdsBus, DdsBus], still: Still, blind: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     robot, program = ends
+    monkeypatch.setattr(process, "PATIENCE", 60.0)  # no cycle without a state, however slow this machine is
+    connect(robot, program, messages.LOW_STATE)
+    connect(program, robot, messages.LOW_COMMAND)
     rollout, targets = Rollout(still, blind), {}
     about = {"export": export_digest(still.controller), "scene": "free", "recipe": "blind"}
     about["limits"] = still.machine.limits.model_dump_json()
     with LogWriter(tmp_path / "log.mcap", about) as log:
-        ended = threading.Event()
         loop = threading.Thread(
             target=drive,
             args=(program, still.machine, rollout, LockStep()),
-            kwargs={"log": log, "tell": lambda _: None, "stopped": ended.is_set},
+            kwargs={"log": log, "tell": lambda _: None, "stopped": lambda: rollout.ended},
         )
         loop.start()
-        while rollout.run < 10 * STEPS and rollout.turns < 5000:
+        while loop.is_alive():
             robot.publish(rollout.state())
-            robot.wait(messages.LOW_COMMAND, 5.0)
+            robot.wait(messages.LOW_COMMAND, 1.0 if rollout.ended else 30.0)
             for command in robot.take(messages.LOW_COMMAND):
                 targets[rollout.run] = command["motor_cmd"]["q"][:29]
-        ended.set()
-        loop.join()
     offline, sensors = Controller.load(blind), Sensors(29)
     offline.reset(scene="free")
     expected = []
