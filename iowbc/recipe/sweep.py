@@ -232,6 +232,8 @@ def _require_axes(axes: Sequence[str], file: Path | None) -> None:
 
 def _read_file(file: Path) -> SweepFile:
     """Contents of the file of a sweep. Raises `RecipeError` with every problem and its line."""
+    if not file.exists():
+        raise RecipeError([Problem(f"--from {file}", "no such file")])
     tree = read_document(read_text(str(file), f"{file}:1:1"), str(file))
     if not isinstance(tree.value, dict):
         raise RecipeError([Problem(tree.place, "a sweep is a mapping with `grid`, `draws` or both")])

@@ -157,3 +157,9 @@ def test_a_wrong_file_is_told_with_its_line(recipe: str, tmp_path: Path, text: s
     with pytest.raises(RecipeError) as caught:
         load_sweep(recipe, [], described(tmp_path, text))
     assert told in str(caught.value)
+
+
+def test_a_missing_file_of_a_sweep_is_not_taken_for_a_recipe(recipe: str, tmp_path: Path) -> None:
+    with pytest.raises(RecipeError) as caught:
+        load_sweep(recipe, [], tmp_path / "full")
+    assert str(caught.value) == f"--from {tmp_path}/full: no such file"
