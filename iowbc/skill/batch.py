@@ -1,7 +1,6 @@
-"""Games of one process, built from a `GameSetup`: decisions of robot and human, control steps, rewards and endings."""
+"""Games of one process: decisions of robot and human, control steps, rewards and endings."""
 
-from dataclasses import dataclass
-from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -9,10 +8,7 @@ from iowbc import counter_random as random
 from iowbc.arrays import Array, Indices, Keys, Mask
 from iowbc.control.hand_forces import HandForces
 from iowbc.control.skill_observation import YAW, joined, of_object, robot_observation
-from iowbc.errors import UsageError, require_known
 from iowbc.evaluation.trials.plan import UNDISTURBED
-from iowbc.recipe.skill.skill import Skill
-from iowbc.recipe.skill.task import TransportTask
 from iowbc.robot.rotations import turned
 from iowbc.rollouts.blocks import block_size
 from iowbc.sim.shapes import measured as shape_of
@@ -20,16 +16,17 @@ from iowbc.skill import observation as seen
 from iowbc.skill.episode_draws import EpisodeDraws
 from iowbc.skill.figures import FIGURES, EpisodeFigures, internal_force
 from iowbc.skill.human import Human
-from iowbc.skill.lower_layer import LowerLayer, Student
+from iowbc.skill.lower_layer import LowerLayer
 from iowbc.skill.object_motion import NominalCommand, ObjectMotion, open_loop_motion, pursue
 from iowbc.skill.path import Paths
-from iowbc.skill.plan import CLOCK, KINDS, PERSON, RULES, Plan
+from iowbc.skill.plan import CLOCK, KINDS, PERSON, RULES
 from iowbc.skill.reward import GameEnding, ending, potential, reward
 from iowbc.skill.situation import GameState, Origin, situation
 from iowbc.task.episodes import Episode
-from iowbc.task.specification import Specification
-from iowbc.task.vector.setup import scene_of
-from iowbc.task.vector.shared import Buffers, Fields
+from iowbc.task.vector.shared import Buffers
+
+if TYPE_CHECKING:
+    from iowbc.skill.setup import GameSetup
 
 NO_LIMIT = 1e6
 """Time limit of the lower layer's episodes [s]: the game ends them."""
@@ -37,76 +34,10 @@ CORNERS = np.array([[1.0, 1.0], [1.0, -1.0], [-1.0, -1.0], [-1.0, 1.0]])
 ROBOT_ACTIONS, HUMAN_ACTIONS = 11, 5
 
 
-@dataclass(frozen=True)
-class GameSetup:
-    """All games of a `TransportGame`."""
-
-    specification: Specification
-    student: Student
-    """The controller below the games."""
-    count: int
-    seed: int
-    partners: tuple[str, ...]
-    """Humans to sample in games without a plan."""
-    plans: tuple[Plan, ...] | None = None
-    """One per game; without plans, tasks and humans are sampled."""
-
-    def __post_init__(self) -> None:
-        """Raises UsageError for an unknown task or human, or a wrong number of plans or games."""
-        if self.count < 1 or (self.plans is not None and len(self.plans) != self.count):
-            found = "no games" if self.plans is None else f"{len(self.plans)} plans for {self.count} games"
-            raise UsageError(f"{found}: give each of one or more games its plan")
-        for kind in (*self.partners, *(plan.partner for plan in self.plans or ())):
-            require_known(kind, "human", KINDS)
-        for plan in self.plans or ():
-            require_known(plan.task, "transport task", self.skill.tasks.names)
-
-    @property
-    def skill(self) -> Skill:
-        return self.specification.recipe.skill
-
-    @cached_property
-    def tasks(self) -> dict[str, TransportTask]:
-        return {name: getattr(self.skill.tasks, name) for name in self.skill.tasks.names}
-
-    @cached_property
-    def scenes(self) -> list[str]:
-        if self.plans is not None:
-            return [self.tasks[plan.task].scene for plan in self.plans]
-        weights: dict[str, float] = {}
-        for task in self.tasks.values():
-            weights[task.scene] = weights.get(task.scene, 0.0) + task.weight
-        return scene_of(self.count, weights.items())
-
-    def keys(self, first: int, last: int) -> Keys:
-        """Random keys of some games, (k,)."""
-        key = random.environment_key(self.seed, np.arange(first, last))
-        for row, plan in enumerate(self.plans[first:last] if self.plans is not None else ()):
-            if plan.seed is not None:
-                key[row] = random.environment_key(plan.seed, np.zeros(1, np.int64))[0]
-        return key
-
-    def buffer_fields(self) -> Fields:
-        """Buffers that games and learner share."""
-        sizes = {f"{time}/{name}": size for time in ("now", "final") for name, size in seen.sizes(self.skill)}
-        sizes |= {"action/robot": ROBOT_ACTIONS, "action/human": HUMAN_ACTIONS, "privileged_action": ROBOT_ACTIONS}
-        return {
-            **{name: ((size,), "float32") for name, size in sizes.items()},
-            "reward": ((), "float32"),
-            **dict.fromkeys(("terminated", "truncated", "human_acts"), ((), "bool")),
-            "figures": ((len(FIGURES),), "float64"),
-            "counters": ((1,), "float64"),
-        }
-
-    def batch(self, first: int, last: int, buffers: Buffers) -> "GameBatch":
-        """The games from `first` to `last` (excluded)."""
-        return GameBatch(self, first, last, buffers)
-
-
 class GameBatch:
     """n games. `reset` and `step` read the actions from the buffers and write all results to them."""
 
-    def __init__(self, setup: GameSetup, first: int, last: int, buffers: Buffers) -> None:
+    def __init__(self, setup: "GameSetup", first: int, last: int, buffers: Buffers) -> None:
         """Games from `first` to `last` (excluded); `buffers` hold only their rows."""
         recipe, self._skill = setup.specification.recipe, setup.skill
         self.buffers, self._games, self._keys = buffers, np.arange(first, last), setup.keys(first, last)
