@@ -4,7 +4,7 @@ import numpy as np
 
 from iowbc.arrays import Array, Mask, namespace
 from iowbc.control.sensors import Measured
-from iowbc.recipe.task.joint_references import GaitPrior, PostureSteps, Recovery
+from iowbc.recipe.task.joint_references import GaitPrior, Recovery
 from iowbc.robot.mirror import in_place
 
 TINY = 1e-6
@@ -20,27 +20,13 @@ def wants_to_move(command: Array, gait: GaitPrior) -> Mask:
     return (speed > gait.moving_speed) | (xp.abs(command[:, 2]) > gait.moving_yaw_rate)
 
 
-def changes_posture(change: Array, posture: PostureSteps) -> Mask:
-    """True where the commanded posture has changed recently, (n,), by height [m] and pitch [rad], (n, 2)."""
-    return (abs(change[:, 0]) > posture.height) | (abs(change[:, 1]) > posture.pitch)
-
-
-def mean_tilt(before: Array, measured: Measured, pelvis_pitch: Array, recovery: Recovery, dt: float) -> Array:
-    """Mean over `filter_time` of the base's tilt extrapolated over `horizon`, pitch and roll, a control period `dt` [s]
-    later, (n, 2) [rad]: the measured gravity's, less the reference's, and their rates by the gyroscope.
-
-    `before`: the mean until now, (n, 2) [rad]; `pelvis_pitch` of the reference posture (n,) [rad].
-    """
+def is_falling(measured: Measured, pelvis_pitch: Array, recovery: Recovery) -> Mask:
+    """True where the base is tipping over, (n,), by pitch and roll of the measured gravity, less the reference's, and
+    their rates by the gyroscope; `pelvis_pitch` of the reference posture (n,) [rad]."""
     xp, gravity, rate = namespace(pelvis_pitch), measured.projected_gravity, measured.base_angular_velocity
     pitch = gravity[:, 0] - xp.sin(pelvis_pitch) + recovery.horizon * rate[:, 1]
     roll = -gravity[:, 1] + recovery.horizon * rate[:, 0]
-    kept = recovery.filter_time / (recovery.filter_time + dt)
-    return kept * before + (1.0 - kept) * xp.stack([pitch, roll], 1)
-
-
-def is_falling(tilt: Array, recovery: Recovery) -> Mask:
-    """True where the base is tipping over, (n,), by its mean tilt (n, 2) [rad]."""
-    return (tilt * tilt).sum(1) > recovery.tilt**2
+    return pitch * pitch + roll * roll > recovery.tilt**2
 
 
 def foot_phase(phase: Array) -> Array:

@@ -27,10 +27,8 @@ def both_wrists(left: tuple[float, float, float]) -> Array:
     return np.stack([np.array(left), VECTOR_SIGN * np.array(left)])
 
 
-FEET, STRETCH, TURN, TILT, CHANGE = slice(0, 3), slice(3, 4), slice(4, 5), slice(5, 7), slice(7, 9)
-"""Places in the feedback: forward offset of left foot, right foot and both [m], stretch of both legs [m], turn of both
-hips [rad], mean tilt of the base, pitch and roll [rad], recent change of the commanded height [m] and pitch [rad]."""
-FEEDBACK_SIZE = 9
+STRETCH, TURN = 3, 4
+"""Places of the stretch of the legs and the turn of the hips in the feedback, after the offsets of the feet."""
 
 
 class ReferenceLayer(Constants):
@@ -115,7 +113,7 @@ class ReferenceLayer(Constants):
             pitch = self.start_pitch(support, command)
             support = self._stride(support, pitch, command, phase, 1.0 * stepping, feedback)
         if self._hips is not None and feedback is not None:
-            support = self._hips.turned(support, feedback[:, TURN])
+            support = self._hips.turned(support, feedback[:, TURN:])
         return support
 
     def pace(
@@ -126,33 +124,24 @@ class ReferenceLayer(Constants):
         measured: Measured,
         support: Array,
         command: Array,
-        before: Array,
         dt: float,
     ) -> tuple[Array, Mask, Array]:
-        """Gait phase (n,), whether the clock runs (n,), and feedback (n, 9) one control period later.
+        """Gait phase (n,), whether the clock runs (n,), and feedback (n, 5) one control period later: offset of left
+        foot, right foot and both, stretch of both legs [m], turn of both hips [rad].
 
-        The clock runs for a commanded velocity, while the commanded posture changes, if the recipe says so, or to catch
-        a fall. `before`: the command of the previous period (n, 11)."""
-        feet, stretch, turn, tilt = feedback[:, FEET], feedback[:, STRETCH], feedback[:, TURN], feedback[:, TILT]
-        prior, change = self._settings, feedback[:, CHANGE]
-        moving = gait.wants_to_move(command, prior)
-        if prior.posture is not None:
-            change = change + command[:, HEIGHT : PITCH + 1] - before[:, HEIGHT : PITCH + 1]
-            change = change * (prior.posture.time / (prior.posture.time + dt))
-            moving = moving | gait.changes_posture(change, prior.posture)
-        if prior.recovery is not None:
-            pitch = self.start_pitch(support, command)
-            pitch = pitch - turn[:, 0] if prior.recovery.turned else pitch
-            tilt = gait.mean_tilt(tilt, measured, pitch, prior.recovery, dt)
-            moving = moving | gait.is_falling(tilt, prior.recovery)
-        phase, stepping = gait.advance(phase, stepping, moving, prior, dt)
+        The clock runs for a commanded velocity, or to catch a fall."""
+        moving, recovery = gait.wants_to_move(command, self._settings), self._settings.recovery
+        if recovery is not None:
+            moving = moving | gait.is_falling(measured, self.start_pitch(support, command), recovery)
+        phase, stepping = gait.advance(phase, stepping, moving, self._settings, dt)
+        feet, stretch, turn = feedback[:, :STRETCH], feedback[:, STRETCH:TURN], feedback[:, TURN:]
         if self._placement is not None:
             feet = self._placement(feet, measured, command, phase, 1.0 * stepping, dt)
         if self._legs is not None:
             stretch = self._legs(stretch, measured, command, dt)
         if self._hips is not None:
             turn = self._hips(turn, measured, command, dt)
-        return phase, stepping, namespace(feedback).concatenate([feet, stretch, turn, tilt, change], -1)
+        return phase, stepping, namespace(feedback).concatenate([feet, stretch, turn], -1)
 
     def pelvis_pitch(self, support: Array, command: Array) -> Array:
         """Pelvis pitch of the reference posture, (n,) [rad]: the torso's less the waist's."""

@@ -15,7 +15,7 @@ from iowbc.control import gait
 from iowbc.control.action import action_scale, applied_action
 from iowbc.control.command import COMMAND, YAW_RATE, approach, rate_limits
 from iowbc.control.observation import ObservationLayout, PolicyInputs
-from iowbc.control.references import FEEDBACK_SIZE, ReferenceLayer
+from iowbc.control.references import ReferenceLayer
 from iowbc.control.sensors import Measured
 from iowbc.recipe.task.task import Task
 from iowbc.robot.description import Robot
@@ -36,10 +36,9 @@ class State:
     stepping: Annotated[Array, "1", "-", "1 while the gait clock runs, else 0"]
     feedback: Annotated[
         Array,
-        "m, m, m, m, rad, rad, rad, m, rad",
+        "m, m, m, m, rad",
         "heading",
-        "forward offset of left foot, right foot and both; stretch of both legs; turn of both hips; mean tilt (pitch, "
-        "roll); recent change of the commanded height and pitch",
+        "forward offset of left foot, right foot and both; stretch of both legs; turn of both hips",
     ]
     begun: Annotated[Array, "1", "-", "0 in the state that settle.onnx makes, 1 afterwards"]
     action: Annotated[Array, "action", "joint", "residual action of the policy, clipped, support order"]
@@ -87,7 +86,7 @@ class ControlStep(Constants):
             "arms": (arms,),
             "posture": (support,),
             **dict.fromkeys(("heading_reference", "phase", "stepping"), (1,)),
-            "feedback": (FEEDBACK_SIZE,),
+            "feedback": (5,),
             "begun": (1,),
             "action": (support,),
             "history": (history, layout.size),
@@ -103,9 +102,7 @@ class ControlStep(Constants):
         arms, posture = self.references.start(command, grasp)
         zero = 0.0 * heading
         blank = zero[:, None] + self._blank
-        return State(
-            command, arms, posture, heading, zero, zero, 0.0 * command[:, :FEEDBACK_SIZE], zero, 0.0 * posture, blank
-        )
+        return State(command, arms, posture, heading, zero, zero, 0.0 * command[:, :5], zero, 0.0 * posture, blank)
 
     def step(self, measured: Measured, command: Array, grasp: Array, load: Array, state: State) -> StepResult:
         """One control period. `load` (n, 1): mass that the arms expect between the hands [kg]; the rest as in `settle`.
@@ -120,7 +117,7 @@ class ControlStep(Constants):
         posture = self.references.support(arms, command)
         before, ran = state.phase[:, 0], state.stepping[:, 0] > 0.5
         phase, runs, feedback = self.references.pace(
-            before, ran, state.feedback, measured, posture, command, state.command, self._period
+            before, ran, state.feedback, measured, posture, command, self._period
         )
         phase, feedback = xp.where(begun[:, 0], phase, before), xp.where(begun, feedback, state.feedback)
         stepping = (begun[:, 0] & runs) | (~begun[:, 0] & ran)

@@ -63,16 +63,16 @@ class Guidance:
     def advance(self, memory: EpisodeState, key: Keys, measured: Measured) -> None:
         """Command, references and gait clock of the next step; keys of the episodes, (n,)."""
         period = self._period
-        before = memory.command.copy()
+        height = memory.command[:, HEIGHT].copy()
         self.commander.advance(memory, key)
-        memory.height_rate[:] = (memory.command - before)[:, HEIGHT] / period
+        memory.height_rate[:] = (memory.command[:, HEIGHT] - height) / period
         arms, posture = self.references.advance(
             memory.arms, memory.posture, memory.command, self.grasp, period, self._frames
         )
         self._frames = None
         memory.arms[:], memory.posture[:] = arms, posture
         phase, stepping, feedback = self.references.pace(
-            memory.phase, memory.stepping, memory.feedback, measured, posture, memory.command, before, period
+            memory.phase, memory.stepping, memory.feedback, measured, posture, memory.command, period
         )
         memory.phase[:], memory.stepping[:], memory.feedback[:] = phase, stepping, feedback
         memory.support[:] = self.references.with_stride(posture, memory.command, phase, stepping, feedback)

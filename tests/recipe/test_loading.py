@@ -111,13 +111,11 @@ def test_a_name_that_reads_as_something_else_is_text_wherever_it_is_read_again(t
     assert load_recipe(kept).recipe == recipe
 
 
-def test_feedback_without_what_it_acts_on_is_refused(tmp_path: Path) -> None:
+def test_feedback_on_the_feet_of_a_gait_prior_that_is_off_is_refused(tmp_path: Path) -> None:
     (text,) = problems(tmp_path, "task: {references: {gait: {enabled: false, placement: {}}}}\n")
     assert "placement: moves the feet of the gait prior, which is off" in text
     (text,) = problems(tmp_path, "task: {references: {gait: {enabled: false}, height: {}}}\n")
     assert "height: stretches the legs of the gait prior, which is off" in text
-    (text,) = problems(tmp_path, "task: {references: {gait: {recovery: {turned: true}}}}\n")
-    assert "gait.recovery.turned: needs feedback of the torso" in text
 
 
 def test_a_controller_that_sets_joint_targets_itself_follows_no_previous_action(tmp_path: Path) -> None:

@@ -11,17 +11,9 @@ from task_worlds import QUIET, rollout, same
 from iowbc.control.command import HEIGHT, OFFSET, PITCH, nominal_command
 from iowbc.control.feasible_map import FeasibleMap
 from iowbc.control.generator import ReferenceNetwork
-from iowbc.control.references import FEEDBACK_SIZE, TURN, ReferenceLayer, both_wrists
-from iowbc.control.sensors import Measured
+from iowbc.control.references import ReferenceLayer, both_wrists
 from iowbc.recipe.recipe import Recipe
-from iowbc.recipe.task.joint_references import (
-    ArmReference,
-    GaitPrior,
-    PostureSteps,
-    Recovery,
-    References,
-    TorsoFeedback,
-)
+from iowbc.recipe.task.joint_references import ArmReference, GaitPrior, References
 from iowbc.robot.description import Robot
 from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv
@@ -198,38 +190,3 @@ def test_motors_follow_a_share_of_the_previous_action(make: Make, robot: Robot) 
     assert still == pytest.approx(0.0, abs=1e-12)
     moved = batch.targets(np.ones((2, 15)))[:, robot.support] - batch.memory.support
     assert moved == pytest.approx(np.tile(robot.action_scale, (2, 1)))
-
-
-@pytest.mark.parametrize("turned", [False, True])
-def test_a_pelvis_that_the_hips_turn_back_is_falling_unless_this_is_known(robot: Robot, *, turned: bool) -> None:
-    recovery = Recovery(tilt=0.1, turned=turned)
-    layer = ReferenceLayer(robot, References(gait=GaitPrior(recovery=recovery), torso=TorsoFeedback()), None)
-    asked, rest = command(), np.zeros(1)
-    feedback = np.zeros((1, FEEDBACK_SIZE))
-    feedback[:, TURN] = 0.15
-    back = np.array([[np.sin(-0.15), 0.0, -np.cos(0.15)]])
-    joints = np.zeros((1, len(robot.joints)))
-    measured = Measured(back, np.zeros((1, 3)), np.zeros((1, 1)), joints, joints)
-    support = layer.support(layer.default_arms[None], asked)
-    _, stepping, _ = layer.pace(rest, rest > 0.0, feedback, measured, support, asked, asked, 0.02)
-    assert bool(stepping) is not turned
-
-
-def test_the_clock_runs_while_the_commanded_posture_changes_and_half_a_second_longer(robot: Robot) -> None:
-    layer = ReferenceLayer(robot, References(gait=GaitPrior(posture=PostureSteps())), None)
-    joints = np.zeros((1, len(robot.joints)))
-    measured = Measured(np.array([[0.0, 0.0, -1.0]]), np.zeros((1, 3)), np.zeros((1, 1)), joints, joints)
-    pitches = np.concatenate([np.zeros(25), np.linspace(0.01, 0.3, 30), np.full(75, 0.3)])  # 0.5 rad/s for 0.6 s
-    before = command()
-    support = layer.support(layer.default_arms[None], before)
-    phase, stepping, feedback = np.zeros(1), np.zeros(1, np.bool_), np.zeros((1, FEEDBACK_SIZE))
-    course = []
-    for pitch in pitches:
-        asked = command(pitch=pitch)
-        phase, stepping, feedback = layer.pace(phase, stepping, feedback, measured, support, asked, before, 0.02)
-        course.append(bool(stepping))
-        before = asked
-    assert not any(course[:25])
-    assert not course[29], "a small change asks for no steps"
-    assert all(course[31:80])
-    assert not any(course[105:]), "the clock rests at the next double support"
