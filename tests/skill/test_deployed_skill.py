@@ -39,7 +39,7 @@ that which comes into force."""
 def controller(request: pytest.FixtureRequest) -> Controller:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("IOWBC_RUNS", str(ROOT / "runs"))
-        return Controller.load(exported_folder("compliant_merged"))
+        return Controller.load(exported_folder("compliant_correlated"))
 
 
 @pytest.fixture(scope="module")
@@ -198,7 +198,7 @@ def test_steps_of_both_are_timed_without_those_that_settle(
     decided: list[int] = []
     step = Skill.step
     monkeypatch.setattr(Skill, "step", lambda skill, measured: decided.append(1) or step(skill, measured))
-    taken = step_seconds("compliant_merged", 7, folder)
+    taken = step_seconds("compliant_correlated", 7, folder)
     assert taken.shape == (7, 2)
     assert (taken > 0.0).all()
     assert len(decided) == 8, "the first one settles, and is not among the seven"

@@ -75,7 +75,7 @@ def _push(path: tuple[Stretch, ...], duration: float) -> TransportTask:
 
 
 def _lift(path: tuple[Stretch, ...], duration: float) -> TransportTask:
-    """A box that `compliant_merged` cannot carry alone for the length of a game."""
+    """A box that `compliant_correlated` cannot carry alone for the length of a game."""
     return TransportTask(scene="lift", path=path, mass=(14.0, 17.0), duration=duration)
 
 
