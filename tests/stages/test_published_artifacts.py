@@ -35,7 +35,7 @@ PUBLISHED_TO = {
     "compliant_wide": "teacher",
     "compliant_pace": "teacher",
     "compliant_steady": "teacher",
-    "compliant_merged": "export",
+    "compliant_merged": "teacher",
     "compliant_merged_seed_1": "teacher",
     "compliant_merged_seed_2": "teacher",
     "compliant_correlated": "export",
