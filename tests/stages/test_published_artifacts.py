@@ -16,8 +16,9 @@ from iowbc.control.sensors import Measured
 from iowbc.deploy.controller import Controller
 from iowbc.errors import UsageError
 from iowbc.evaluation.report.aggregate import aggregate
-from iowbc.pipeline.store.runs import Runs
+from iowbc.pipeline.store.runs import Runs, read_yaml
 from iowbc.pipeline.store.store import Store
+from iowbc.recipe.recipe import Recipe
 from iowbc.report.runs import grouped
 
 ROOT = Path(__file__).parents[2]
@@ -65,6 +66,11 @@ def test_a_fresh_clone_finds_the_stages_of_a_recipe_published(recipe: str, last:
     states = {stage["stage"]: stage["cached"] and stage["published"] for stage in plan["stages"]}
     assert all(states.values()), (states, plan["stages"])
     assert last in states
+
+
+def test_this_version_reads_the_recipe_of_each_published_artifact() -> None:
+    for file in sorted((ROOT / "runs" / "published").glob("*/*/recipe.yaml")):
+        Recipe.model_validate(read_yaml(file))
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """Joint references computed from a command."""
 
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
@@ -71,6 +72,8 @@ class ArmReference(Section):
 class Recovery(Section):
     """Recovery steps while no velocity is commanded: the gait clock runs while the base is measured to fall."""
 
+    withdrawn: ClassVar[Mapping[str, Any]] = {"filter_time": 0.0, "turned": False}
+
     tilt: float = Field(default=0.25, gt=0.0)
     """Predicted tilt relative to the pelvis of the reference posture at which the clock starts [rad]: pitch and roll,
     extrapolated over `horizon`. A quiet robot measures a median of 0.1, and 0.25 in one step of a hundred: up to 0.15
@@ -127,6 +130,8 @@ class HeightFeedback(Section):
 
 class GaitPrior(Section):
     """The gait clock, and the stride that it adds to the support reference while a velocity is commanded."""
+
+    withdrawn: ClassVar[Mapping[str, Any]] = {"posture": None}
 
     enabled: bool = True
     """Add the stride to the support reference; otherwise the reference is the paper's, and the clock still runs."""
