@@ -29,6 +29,7 @@ def both_wrists(left: tuple[float, float, float]) -> Array:
 
 STRETCH, TURN = 3, 4
 """Places of the stretch of the legs and the turn of the hips in the feedback, after the offsets of the feet."""
+FEEDBACK_SIZE = 5
 
 
 class ReferenceLayer(Constants):

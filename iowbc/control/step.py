@@ -15,7 +15,7 @@ from iowbc.control import gait
 from iowbc.control.action import action_scale, applied_action
 from iowbc.control.command import COMMAND, YAW_RATE, approach, rate_limits
 from iowbc.control.observation import ObservationLayout, PolicyInputs
-from iowbc.control.references import ReferenceLayer
+from iowbc.control.references import FEEDBACK_SIZE, ReferenceLayer
 from iowbc.control.sensors import Measured
 from iowbc.recipe.task.task import Task
 from iowbc.robot.description import Robot
@@ -86,7 +86,7 @@ class ControlStep(Constants):
             "arms": (arms,),
             "posture": (support,),
             **dict.fromkeys(("heading_reference", "phase", "stepping"), (1,)),
-            "feedback": (5,),
+            "feedback": (FEEDBACK_SIZE,),
             "begun": (1,),
             "action": (support,),
             "history": (history, layout.size),
@@ -102,7 +102,9 @@ class ControlStep(Constants):
         arms, posture = self.references.start(command, grasp)
         zero = 0.0 * heading
         blank = zero[:, None] + self._blank
-        return State(command, arms, posture, heading, zero, zero, 0.0 * command[:, :5], zero, 0.0 * posture, blank)
+        return State(
+            command, arms, posture, heading, zero, zero, 0.0 * command[:, :FEEDBACK_SIZE], zero, 0.0 * posture, blank
+        )
 
     def step(self, measured: Measured, command: Array, grasp: Array, load: Array, state: State) -> StepResult:
         """One control period. `load` (n, 1): mass that the arms expect between the hands [kg]; the rest as in `settle`.

@@ -4,6 +4,7 @@ import numpy as np
 
 from iowbc.arrays import Indices
 from iowbc.control.command import COMMAND
+from iowbc.control.references import FEEDBACK_SIZE
 from iowbc.task.curriculum import AXES
 from iowbc.task.rewards.table import TRACKED
 
@@ -55,7 +56,7 @@ class EpisodeState:
         """Gait phase, (n,)."""
         self.stepping = np.zeros(n, np.bool_)
         """True where the gait clock runs, (n,)."""
-        self.feedback = np.zeros((n, 5))
+        self.feedback = np.zeros((n, FEEDBACK_SIZE))
         """Forward offset of left foot, right foot and both from their places in the stride, stretch of both legs [m],
         and turn of both hips [rad], (n, 5)."""
         self.arms = np.zeros((n, arms))
