@@ -53,7 +53,7 @@ def scene_spec(robot: Robot, physics: Physics, scene: Scene, timing: Timing, *, 
     legs = {body.name: side for side, chain in enumerate(chains) for body in chain}
     for geom in list(spec.geoms):
         if geom in foot_points:
-            geom.priority = 1
+            geom.priority, geom.solref = 1, [physics.foot_time_constant, 1.0]
             continue
         shape = bool(geom.contype) or geom.parent.name in robot.sole_bodies
         geom.contype, geom.conaffinity = _touches(geom, shape, physics.body_contact)

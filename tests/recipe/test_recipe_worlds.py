@@ -85,7 +85,7 @@ def test_every_accepted_recipe_builds_its_world_or_is_refused_with_line_and_key(
     ("text", "told"),
     [
         ("physics: {timestep: 0.003}", "key 'simulation.physics.timestep' = 0.003: 0.003 s does not"),
-        ("physics: {timestep: 0.02}\ntask: {control_frequency: 100}", "take 0.01 s"),
+        ("physics: {timestep: 0.02, foot_time_constant: 0.04}\ntask: {control_frequency: 100}", "take 0.01 s"),
         ("physics: {}\neval: {engine: drake, drake: {timestep: 0.003}}", "key 'eval.drake.timestep' = 0.003: 0.003 s"),
         (
             "physics: {}\neval: {simulation: {physics: {timestep: 0.003}}}",

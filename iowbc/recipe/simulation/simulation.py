@@ -5,7 +5,7 @@ from typing import Any, ClassVar, Literal
 
 from pydantic import Field
 
-from iowbc.recipe.section import Section
+from iowbc.recipe.section import LATER, Problems, Section
 from iowbc.recipe.simulation.partner import PartnerSettings
 from iowbc.recipe.simulation.randomization import Impulses, Pushes, Randomization
 from iowbc.recipe.simulation.scene import Scenes
@@ -51,6 +51,9 @@ class Physics(Section):
     zero. An assumption, not a measured curve."""
     cone: Literal["pyramidal", "elliptic"] = "pyramidal"
     """Friction cone: an inscribed pyramid, or the exact elliptic cone at 10 % more computing time."""
+    foot_time_constant: float = Field(default=0.02, gt=0.0, json_schema_extra=LATER)
+    """Time constant of the contact between feet and ground [s], at least two physics steps. It is also that of a
+    sliding foot's deceleration: with 10 ms and the elliptic cone feet slide half as far (docs/engines.md)."""
     solver: Literal["newton", "cg"] = "newton"
     """Constraint solver."""
     iterations: int = Field(default=10, ge=1, le=10_000)
@@ -67,6 +70,11 @@ class Physics(Section):
     """Smallest contact force of a foot on the ground, or of a palm on an object, that counts as contact [N]."""
     fastest: float = Field(default=200.0, gt=0.0)
     """Speed above which a simulation counts as diverged [m/s, rad/s]; the fastest joint reaches 37 rad/s."""
+
+    def problems(self) -> Problems:
+        if self.foot_time_constant < 2.0 * self.timestep:
+            text = f"{self.foot_time_constant:g} s is less than two physics steps of {self.timestep:g} s"
+            yield "", f"foot_time_constant: {text}: raise it or shorten `timestep`"
 
 
 class SimulationSettings(Section):
