@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from changes import changed
 from stepping import run
 
 from iowbc.robot.description import GRAVITY
@@ -49,6 +50,24 @@ def test_soles_in_the_air_have_no_pressure_and_sink_as_what_falls(start, calm):
     assert not soles["foot_margin"].any()
     assert soles["foot_sink"][0] == pytest.approx([GRAVITY * 10 * simulation.period] * 2, rel=0.02)
     assert not soles["foot_peak"].any()
+
+
+@pytest.mark.parametrize("cone", ["pyramidal", "elliptic"])
+def test_feet_that_slide_stop_sooner_with_a_shorter_time_constant(start, calm, cone):
+    slides = []
+    for time_constant in (0.01, 0.02, 0.04):
+        feet = changed(changed(calm, "physics.cone", cone), "physics.foot_time_constant", time_constant)
+        simulation = start(feet, ["free"])
+        run(simulation, 10)
+        simulation.worlds[0].qvel[0, 0] += 0.2
+        slides.append(sum(_slide(simulation) for _ in range(5)))
+    assert slides[0] < 0.5 * slides[1] < 0.25 * slides[2]
+
+
+def _slide(simulation):
+    """Distance that both soles slide in a control period [m]."""
+    simulation.step()
+    return simulation.soles["foot_slide"].sum() * simulation.period
 
 
 def test_a_point_is_as_far_inside_a_polygon_as_its_nearest_side():
