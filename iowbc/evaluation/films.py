@@ -16,9 +16,8 @@ from PIL import Image, ImageDraw, ImageFont
 from iowbc.arrays import Array
 from iowbc.errors import NoRenderer
 from iowbc.evaluation.report.aggregate import case_names
-from iowbc.evaluation.trials.fixed_batch import in_batch
 from iowbc.evaluation.trials.plan import Trial
-from iowbc.evaluation.trials.rollout import Outcome, play_in, playing
+from iowbc.evaluation.trials.rollout import Outcome, in_batch, play_in, playing
 from iowbc.evaluation.trials.table import replayed
 from iowbc.learning.acting import Policy
 from iowbc.recipe.evaluation.evaluation import Video

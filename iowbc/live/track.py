@@ -11,9 +11,8 @@ import pandas as pd
 from iowbc.arrays import Array
 from iowbc.evaluation.side_by_side import Actor
 from iowbc.evaluation.trials.errors import deviations_from_clamped
-from iowbc.evaluation.trials.fixed_batch import in_batch
 from iowbc.evaluation.trials.interaction import load_metrics
-from iowbc.evaluation.trials.rollout import play_in, playing, trace_of
+from iowbc.evaluation.trials.rollout import in_batch, play_in, playing, trace_of
 from iowbc.evaluation.trials.table import replayed
 from iowbc.live.drag import Drag
 from iowbc.live.drawing import VIEW, GameMarks

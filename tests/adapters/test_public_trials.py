@@ -22,10 +22,9 @@ from iowbc.adapters.source import load_adapter, policy_digest
 from iowbc.cli import app
 from iowbc.commands.bench_carry import SUITES, carry, suite_digest
 from iowbc.control.references import ReferenceLayer
-from iowbc.evaluation.trials.fixed_batch import PolicyInBatch
 from iowbc.evaluation.trials.plan import UNDISTURBED, command_script, planned_episode, planned_sweeps
 from iowbc.evaluation.trials.protocol import evaluated_policy, evaluated_world
-from iowbc.evaluation.trials.rollout import play_episodes
+from iowbc.evaluation.trials.rollout import PolicyInBatch, play_episodes
 from iowbc.recipe.evaluation.sequences import WALKING
 from iowbc.recipe.reading.loading import load_recipe
 from iowbc.recipe.reading.study import load_study

@@ -8,10 +8,9 @@ import pandas as pd
 import pytest
 from stage_jobs import make_job
 
-from iowbc.evaluation.trials.fixed_batch import PolicyInBatch
 from iowbc.evaluation.trials.plan import UNDISTURBED, command_script, planned_episode
 from iowbc.evaluation.trials.protocol import evaluated_policy
-from iowbc.evaluation.trials.rollout import play_episodes
+from iowbc.evaluation.trials.rollout import PolicyInBatch, play_episodes
 from iowbc.recipe.evaluation.sequences import STANDING
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import robot_folder
