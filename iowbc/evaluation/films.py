@@ -1,10 +1,9 @@
 """Videos (mp4) of episodes and replayed trials, with lines of text in a corner."""
 
-import shutil
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
-from tempfile import mkdtemp
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import imageio.v2
@@ -57,14 +56,12 @@ def written_film(path: Path, fps: int) -> Iterator[Callable[[Frame], None]]:
     """Yield a function that appends a frame (H, W, 3) to an mp4 file. The file is created if the block succeeds."""
     path.parent.mkdir(parents=True, exist_ok=True)
     settings = {"fps": fps, "codec": "libx264", "quality": QUALITY, "pixelformat": "yuv420p"}
-    folder = Path(mkdtemp(dir=path.parent, prefix=".film-"))
-    try:
+    with TemporaryDirectory(dir=path.parent, prefix=".film-", ignore_cleanup_errors=True) as folder:
+        film = Path(folder) / path.name
         # `closing`, since the writer's own context manager leaves the encoder running if the block raises
-        with closing(imageio.v2.get_writer(folder / path.name, format="FFMPEG", **settings)) as writer:
+        with closing(imageio.v2.get_writer(film, format="FFMPEG", **settings)) as writer:
             yield writer.append_data
-        (folder / path.name).replace(path)
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
+        film.replace(path)
 
 
 def filmed(trials: pd.DataFrame, count: int) -> list[tuple[str, "pd.Series[Any]"]]:

@@ -3,6 +3,7 @@
 import functools
 import linecache
 import sys
+import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.util import decode_source
@@ -94,10 +95,7 @@ def _told(error: BaseException, file: ModuleFile) -> str:
     """Message of an error in the user's code, with the last line of the file in its traceback."""
     text = error.msg if isinstance(error, SyntaxError) else str(error)
     lines = [error.lineno] if isinstance(error, SyntaxError) and error.lineno else []
-    trace = error.__traceback__
-    while trace is not None:
-        if trace.tb_frame.f_code.co_filename == f"<{file.path} {file.sha256[:8]}>":
-            lines.append(trace.tb_lineno)
-        trace = trace.tb_next
+    name = f"<{file.path} {file.sha256[:8]}>"
+    lines += [line for frame, line in traceback.walk_tb(error.__traceback__) if frame.f_code.co_filename == name]
     line = f" in line {lines[-1]}" if lines else ""
     return f"{type(error).__name__}: {text}{line}"
