@@ -29,8 +29,9 @@ class Soles:
     def arrays(self) -> dict[str, Array]:
         """All quantities by name, (n, 2) each."""
         loaded, pressure = self._pressure()
+        sliding = self._velocity(pressure)  # a foot that rolls over its edge does not slide: this point is at rest
         return {
-            "foot_slide": self._slide(loaded, pressure),
+            "foot_slide": np.hypot(sliding[..., 0], sliding[..., 1]) * loaded,
             "foot_margin": self._margin(loaded, pressure),
             "foot_sink": self._sink(),
             "foot_peak": np.sqrt(np.vecdot(self._past_force, self._past_force).max(axis=2)),
@@ -50,14 +51,6 @@ class Soles:
     def _com(self) -> Array:
         """The robot's centre of mass, (n, 1, 3) [m]."""
         return self._subtree_com[:, self._layout.base][:, None]
-
-    def _slide(self, loaded: Array, pressure: Array) -> Array:
-        """Horizontal speed at the centres of pressure [m/s]; zero in the air.
-
-        A foot that rolls over its edge does not slide: its centre of pressure is at rest.
-        """
-        velocity = self._velocity(pressure)
-        return np.hypot(velocity[..., 0], velocity[..., 1]) * loaded
 
     def _velocity(self, place: Array) -> Array:
         """Velocity of points of the feet, given from the robot's centre of mass, (n, 2, 3) [m/s]."""
