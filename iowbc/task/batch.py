@@ -215,7 +215,7 @@ class Batch:
 
     def set_levels(self, levels: Array) -> None:
         """Sets the curriculum levels (n, axes), from the next episodes on."""
-        self._schedule.set_levels(levels)
+        self.memory.level[:] = levels
 
     def copy(self, source: Indices) -> None:
         """Each environment continues from the state of environment `source`, (n,), of the same scene, with the same

@@ -105,7 +105,3 @@ class Schedule:
         lost, same = ending.failed[chosen], memory.failed_key[chosen] == self.episode_key[chosen]
         memory.failed_key[chosen[lost]] = self.episode_key[chosen[lost]]
         memory.failed[chosen] = lost | (memory.failed[chosen] & ~same)
-
-    def set_levels(self, levels: Array) -> None:
-        """Sets the curriculum levels (n, axes), from the next episodes on."""
-        self._memory.level[:] = np.clip(levels, 0.0, self._task.curriculum.limit)

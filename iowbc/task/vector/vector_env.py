@@ -245,6 +245,7 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
         return [False for _ in self._get_indices(indices)]
 
     def _set_levels(self, levels: Array) -> None:
+        levels = np.clip(levels, 0.0, self.setup.specification.recipe.task.curriculum.limit)
         parts = [levels[first:last] for first, last in self.workers.groups]
         self.workers.call([Message(Batch.set_levels, (part,)) for part in parts])
 
