@@ -58,7 +58,10 @@ class Simulation:
         self.n = n = len(self.envs)
         self.period = 1.0 / control_frequency
         self.fixed: dict[str, Array] = {}
-        models = [_scene(recipe, name) for name in scenes]
+        for name in dict.fromkeys(scenes):
+            if name not in recipe.scenes.names:
+                raise KeyError(f"no scene {name!r}; there are: {', '.join(recipe.scenes.names)}")
+        models = [getattr(recipe.scenes, name) for name in scenes]
         if len(models) != n:
             raise ValueError(f"{n} environments but {len(models)} scenes")
         timing = Timing(self.period, recipe.physics.timestep, recipe.randomization.longest_latency)
@@ -326,13 +329,6 @@ class Simulation:
         """Positions of the grips, (2, 3) [m]."""
         world, index = self.world_of(env)
         return world.grips[index].copy()
-
-
-def _scene(recipe: Recipe, name: str) -> Any:
-    known = recipe.scenes.names
-    if name not in known:
-        raise KeyError(f"no scene {name!r}; there are: {', '.join(known)}")
-    return getattr(recipe.scenes, name)
 
 
 def _under(beginning: str, arrays: Mapping[str, Array]) -> dict[str, Array]:
