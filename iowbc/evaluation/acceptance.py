@@ -93,10 +93,8 @@ def acceptance_episodes(recipe: Recipe) -> list[Episode]:
 def run_acceptance(
     world: Specification, exported: Path, interrupted: Callable[[], bool]
 ) -> tuple[ExportedPolicy, list[Accepted]]:
-    """Run the acceptance trials with the controller in the folder `exported`. Raises Interrupted when interrupted.
-
-    Returns the policy, which holds the largest difference of joint targets, and the results.
-    """
+    """Acceptance trials with the controller in the folder `exported`: the policy, which holds the largest difference of
+    joint targets, and the results. Raises Interrupted when interrupted."""
     episodes = acceptance_episodes(world.recipe)
     with playing(world, episodes) as environment:
         policy = ExportedPolicy(Controller.load(exported, robots=len(episodes)), environment)
@@ -140,9 +138,7 @@ def golden_episode(recipe: Recipe) -> Episode:
 
 def golden_inputs(world: Specification, exported: Path, interrupted: Callable[[], bool]) -> list[Values]:
     """Controller inputs of each control step, without the state; fewer than `export.golden_steps` if the robot falls.
-
-    Raises Interrupted.
-    """
+    Raises Interrupted."""
     with playing(world, [golden_episode(world.recipe)]) as environment:
         policy = ExportedPolicy(Controller.load(exported), environment, golden_steps=world.recipe.export.golden_steps)
         play_in(environment, policy, interrupted)

@@ -16,10 +16,8 @@ from iowbc.task.vector.vector_env import VectorEnv
 
 
 def exported_world(folder: Path) -> Specification:
-    """Specification with which an exported controller was accepted, from its folder alone.
-
-    Raises ContractBroken if the folder does not match its contract.
-    """
+    """Specification with which an exported controller was accepted, from its folder alone. Raises ContractBroken if the
+    folder does not match its contract."""
     controller = Controller.load(folder)
     said = controller.contract
     contract.require_sealed(said.files, folder / exported_folder.CONTRACT, exported_folder.RECIPE)
@@ -36,11 +34,9 @@ def exported_world(folder: Path) -> Specification:
 
 
 class ExportedPolicy:
-    """Exported controller as the policy of an in-process vector environment, with a check of its joint targets.
-
-    The environment computes its own joint targets from the action. `largest_difference` is the largest deviation of
-    the controller's targets from them [rad]; it covers arm kinematics, reference generator, gait clock and scaling.
-    """
+    """Exported controller as the policy of an in-process vector environment. `largest_difference`: of its joint targets
+    from those that the environment computes from the action [rad]; it covers arm kinematics, reference generator, gait
+    clock and scaling."""
 
     def __init__(self, controller: Controller, environment: VectorEnv, *, golden_steps: int = 0) -> None:
         """`golden_steps`: number of steps of the first environment to keep as golden vectors."""

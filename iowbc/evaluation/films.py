@@ -65,10 +65,8 @@ def written_film(path: Path, fps: int) -> Iterator[Callable[[Frame], None]]:
 
 
 def filmed(trials: pd.DataFrame, count: int) -> list[tuple[str, "pd.Series[Any]"]]:
-    """Trials to film, with names: the first trial of up to `count` cases, evenly spread in order of the table.
-
-    Only trials with an object if there are any; kinds in `UNSEEN` are excluded. A single film is of the middle case.
-    """
+    """Trials to film, with names: the first trial of up to `count` cases, evenly spread in order of the table; of a
+    single one, the middle case. Only trials with an object if there are any; kinds in `UNSEEN` are excluded."""
     first = trials[(trials["trial"] == 0) & ~trials["kind"].isin(UNSEEN)]
     first = first[first["mass"] > 0] if (first["mass"] > 0).any() else first
     ends = (0, len(first) - 1) if count > 1 else ((len(first) - 1) // 2,) * 2
@@ -129,11 +127,8 @@ def film_episode(
     progress: Callable[[float], None] = lambda seconds: None,
 ) -> tuple[Outcome, int]:
     """Play the first episode of an in-process environment and pass its frames to `add`; returns outcome and number of
-    frames.
-
-    `title`: text in every frame, above the line with time and command; `progress` receives the time reached [s]. Raises
-    Interrupted when interrupted, NoRenderer if rendering is not possible.
-    """
+    frames. `title`: text in every frame, above the line with time and command; `progress` receives the time reached
+    [s]. Raises Interrupted when interrupted, NoRenderer if rendering is not possible."""
     with closing(Filming(environment.batch.simulation, add, video)) as filming:
 
         def look(seconds: float) -> None:

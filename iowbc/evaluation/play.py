@@ -51,8 +51,7 @@ class Source:
 
 
 def with_evaluation(source: Source, evaluation: Evaluation) -> Source:
-    """The source with the sequence, scenes and video settings of another evaluation. An exported controller keeps the
-    scenes of its contract."""
+    """The source with the settings of another evaluation. An exported controller keeps the scenes of its contract."""
     asked = source.world.recipe.model_copy(update={"eval": evaluation})
     world = replace(source.world, recipe=asked)
     return replace(source, world=world if source.exported else evaluated_world(world))
@@ -68,13 +67,9 @@ def play(
     request: PlayRequest,
     progress: Callable[[float, float], None] = lambda seconds, duration: None,
 ) -> tuple[Episode, Outcome, int]:
-    """Play one episode in the viewer or, with `request.video`, to that mp4 file (no display needed).
-
-    Returns the episode, its outcome and the number of video frames, 0 in the viewer. progress: receives the rendered
-    and the total duration of a video [s].
-
-    Raises NoDisplay, ContractBroken for a damaged export, Interrupted when the viewer is closed.
-    """
+    """Play one episode in the viewer or, with `request.video`, to that mp4 file (no display needed): the episode, its
+    outcome and the number of video frames, 0 in the viewer. `progress` receives the rendered and the total duration of
+    a video [s]. Raises NoDisplay, ContractBroken for a damaged export, Interrupted when the viewer is closed."""
     recipe = source.world.recipe
     episode = requested_episode(recipe, request)
     if request.video is None:
@@ -122,9 +117,8 @@ def require_display() -> None:
 
 @contextmanager
 def in_window(simulation: Simulation, lines: Sequence[Line] = ()) -> Iterator[Callable[[float], None]]:
-    """A window that shows the first environment of a simulation, with lines on the ground, until the block ends. Yields
-    a function that shows the present state and waits until a time [s] since the start; it raises Interrupted when the
-    window is closed."""
+    """A window that shows the first environment of a simulation, with lines on the ground. Yields a function that shows
+    the present state and waits until a time [s] since the start; it raises Interrupted when the window is closed."""
     import mujoco.viewer  # needs a window system as soon as it is imported
 
     appearance = Appearance(simulation, 0)

@@ -76,8 +76,7 @@ def read(
     interrupted: Callable[[], bool] = lambda: False,
     progress: Callable[[float], None] = lambda seconds: None,
 ) -> tuple[dict[str, Features], pd.DataFrame]:
-    """Play the trials of `eval.probe`, lightest first; returns the readings of `gathered`. Raises Interrupted when
-    interrupted."""
+    """Play the trials of `eval.probe`, lightest first; returns the readings of `gathered`. Raises Interrupted."""
     recipe, probe = world.recipe, world.recipe.eval.probe
     assert probe is not None
     held = held_fixed(None, disturbed=recipe.eval.disturbances) | probe.fixed
@@ -117,12 +116,9 @@ def gathered(
 
 
 def inferred_masses(features: dict[str, Features], moments: pd.DataFrame) -> pd.DataFrame:
-    """Inferred masses in the test trials, one row per reading and source, from readings of `gathered`.
-
-    Columns: `source` and its `size`, `trial`, `seconds`, `settled` (True if the history was full), `mass` and
-    `inferred` [kg]. The regression is fitted to settled readings of even trials and tested on odd trials, so that no
-    trial is in both sets. Raises StageFailed if too few trials last long enough.
-    """
+    """Inferred masses in the test trials, one row per reading and source, from readings of `gathered`: `source` and its
+    `size`, `trial`, `seconds`, `settled` (True if the history was full), `mass` and `inferred` [kg]. The regression is
+    fitted to settled readings of even trials and tested on odd ones. Raises StageFailed if too few last long enough."""
     tested = moments["trial"] % 2 == 1
     fitted = moments[~tested & moments["settled"]]
     lasted = fitted["trial"].nunique()

@@ -46,10 +46,7 @@ def film_side_by_side(
     actors: Sequence[Actor], rows: Sequence["pd.Series[Any]"], path: Path, progress: Callable[[float, float], None]
 ) -> None:
     """Replay the trial in each actor's row and film them as tiles; a trial that ends early keeps its last frame.
-
-    progress: receives the time played in all trials and their total maximum duration [s]. Raises NoRenderer if
-    rendering is not possible.
-    """
+    `progress` receives the time played in all trials and their total maximum duration [s]. Raises NoRenderer."""
     video = actors[0].world.recipe.eval.video
     with TemporaryDirectory() as place:
         clips: list[list[Path]] = [[] for _ in actors]

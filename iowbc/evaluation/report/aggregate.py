@@ -18,8 +18,7 @@ OVER_ALL_TRIALS = (
     *("transport_robot", "transport_object", "hand_force_mean", "hand_force_p95", "hand_force_peak"),
     *("handle_force_mean", "handle_force_p95", "handle_force_peak", "partner_work"),
 )
-"""Metrics averaged over all trials, up to their end, since a robot pulls before it falls. All others are averaged over
-surviving trials."""
+"""Metrics averaged over all trials, since a robot pulls before it falls; all others over surviving trials."""
 SETTINGS = (
     *("commanded_distance", "partner_share", "rolling_resistance", "pull_frequency", "pull_direction"),
     *("height", "gait_period"),
@@ -115,8 +114,7 @@ def variants_of(trials: pd.DataFrame) -> list[str]:
 
 
 def stepping_commanded(rows: pd.DataFrame) -> bool:
-    """True if stepping is commanded in any of these trials, as in the paper's. Errors of standing are not comparable
-    to the paper's errors of walking."""
+    """True if any of these trials commands stepping, as the paper's do; errors of standing are not comparable."""
     return bool(rows["still_E_v_moving"].notna().any())
 
 

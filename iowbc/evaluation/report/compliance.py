@@ -23,8 +23,7 @@ from iowbc.evaluation.trials.impedance import apparent
 from iowbc.results.table import ABSENT, FAILS, Cell, Column, Table, measured
 
 BLOCKED_BEFORE = {"IO-WBC": (113, 231), "w/o Distill.": (73, 109)}
-"""Range of peak hand forces on a blocked crate [N] over trials of the first published controllers, which were trained
-without a bound on hand forces."""
+"""Range of peak hand forces on a blocked crate [N], of the first published controllers, trained without a bound."""
 
 
 def _force(head: str, name: str) -> Entry:

@@ -11,8 +11,7 @@ from iowbc.evaluation.trials.errors import ERRORS
 from iowbc.results.table import ABSENT, Column, Table, heads, measured
 
 PAIR = ["suite", "case", "mass", "impulse", "trial", "training"]
-"""Columns that identify a pair: trials with the same seed and commands. Trainings are paired in order, the first of a
-variant with the first of the other."""
+"""Columns that identify a pair: trials with the same seed and commands. Trainings are paired in their order."""
 DRAWN = "drawn_"
 """Beginning of the columns with drawn quantities, which are equal in a pair if both recipes have the same world."""
 WITHOUT_EFFECT = ("object_mass_scale",)
@@ -48,8 +47,7 @@ def mean_difference(values: pd.Series, worlds: pd.Series) -> tuple[float, float,
 
 
 def success_p(pairs: pd.DataFrame) -> float:
-    """Exact p-value of equal success, by permutation of the variants within each world; 1 if no pair differs. Equals
-    McNemar's test if no two pairs share a world."""
+    """Exact p-value of equal success, by permutation of the variants within each world; 1 if no pair differs."""
     better = pairs["succeeded_variant"].astype(int) - pairs["succeeded_reference"].astype(int)
     return sign_flip_p(better.groupby(pairs[WORLD]).sum().to_numpy(np.int64))
 

@@ -31,10 +31,8 @@ SWEPT = (*NUMBERS, "squeezing")
 
 
 def error_table(summary: pd.DataFrame, suite: str, name: str | None = None) -> Table:
-    """Errors over the whole trial by mass or case and variant, with survival, success, transport and kept objects.
-
-    Without any variant of the paper, its columns are omitted. name: of the table, default that of the suite.
-    """
+    """Errors over the whole trial by mass or case and variant, with survival, success, transport and kept objects; the
+    paper's columns if it has one of the variants. name: of the table, default that of the suite."""
     chosen = summary[summary["suite"] == suite]
     kind = str(chosen["kind"].iloc[0])
     beside = in_paper(chosen)

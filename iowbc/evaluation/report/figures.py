@@ -71,10 +71,8 @@ def errors_against_mass(summary: pd.DataFrame, suite: str) -> Figure:
 
 
 def comparison(summary: pd.DataFrame, capacity_rate: float) -> Figure:
-    """Error norm over lifting mass and over pushing mass, load capacity, success in the heavy tasks.
-
-    One panel for each of these that was evaluated; of the capacities those that a variant has.
-    """
+    """Error norm over lifting and pushing mass, load capacity, success in the heavy tasks: a panel for each that was
+    evaluated."""
     sweeps = [suites_of(summary, kind)[0] for kind in NUMBERS if suites_of(summary, kind)]
     capacities = load_capacities(summary, capacity_rate)
     carried = {suite for own in capacities.values() for suite, capacity in own.items() if capacity.value is not None}
@@ -120,10 +118,8 @@ def draw_bars(
     labels: Sequence[str],
     intervals: Mapping[str, Array],
 ) -> None:
-    """Grouped bars of all variants for each label, with texts above; no bar for NaN.
-
-    intervals: extent below and above the top of each bar, (2, labels), for variants with intervals.
-    """
+    """Grouped bars of all variants for each label, with texts above; no bar for NaN. intervals: extent below and above
+    the top of each bar, (2, labels), for variants with intervals."""
     width = 0.8 / max(len(heights), 3)
     upright = (
         len(heights) > VARIANTS_PER_PANEL and max(len(text) for row in texts.values() for text in row) > LONGEST_TEXT

@@ -70,8 +70,7 @@ CONTACT = (
 
 
 def contact_table(summary: pd.DataFrame) -> Table:
-    """Foot impacts, margins to tipping and slipping, action smoothness and joint effort of each variant, at the
-    heaviest mass survived in each suite."""
+    """Foot impacts, margins to tipping and slipping, smoothness and effort at the heaviest mass survived by suite."""
     chosen = heaviest(summary)
     rows = variant_rows(CONTACT, [(_load(row), row.to_frame().T) for _, row in chosen.iterrows()])
     caption = (
@@ -86,8 +85,7 @@ def contact_table(summary: pd.DataFrame) -> Table:
 
 
 def heaviest(summary: pd.DataFrame) -> pd.DataFrame:
-    """Rows of the heaviest mass that each variant survived in each suite, of several cases with it the last, without
-    `PROBING` trials."""
+    """Rows of the heaviest mass, the last of several, that a variant survived in a suite, without `PROBING` trials."""
     survived = summary[(summary["survived"] > 0) & ~summary["kind"].isin(PROBING)]
     rows: pd.DataFrame = survived.sort_values("mass", kind="stable").groupby(["suite", "variant"], sort=False).tail(1)
     return rows.sort_index()

@@ -25,10 +25,8 @@ LEAST_TRIALS = 10
 
 
 def write_probe(inferred: pd.DataFrame, folder: Path) -> pd.DataFrame:
-    """Write the table `probe` and its figure under `folder`; returns the table's numbers.
-
-    inferred: `probe.parquet` of one variant, or of several one after another.
-    """
+    """Write the table `probe` and its figure under `folder`; returns the table's numbers. inferred: `probe.parquet` of
+    one variant, or of several one after another."""
     table = probe_table(inferred)
     write_table(table, folder / "tables")
     write_figure(probe_figure(inferred), folder / "figures" / "probe.png")

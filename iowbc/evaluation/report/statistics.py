@@ -58,10 +58,8 @@ def mean_p(values: NDArray[np.float64], worlds: NDArray[np.int64] | None = None)
 
 
 def sign_flip_p(differences: NDArray[np.int64]) -> float:
-    """Exact p-value of a sign-flip permutation test of integer differences (worlds,); McNemar's test if all are ±1.
-
-    P(|Σ ±d| >= |Σ d|) over all signs, from the distribution of the sum.
-    """
+    """Exact p-value of a sign-flip permutation test of integer differences (worlds,), P(|Σ ±d| >= |Σ d|) over all
+    signs, from the distribution of the sum; McNemar's test if all are ±1."""
     sizes = np.abs(differences[differences != 0])
     total, observed = int(sizes.sum()), abs(int(differences.sum()))
     sums, chances = np.arange(-total, total + 1), np.ones(1)

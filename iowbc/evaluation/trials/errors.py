@@ -82,8 +82,6 @@ def moving_average(values: Array, window: int) -> Array:
 
 
 def error_norm(errors: Array) -> Array:
-    """Euclidean norm of the paper's four errors in SI units, shape (..., 4) to (...).
-
-    The paper does not define its "norm error"; this is the simplest reading.
-    """
+    """Euclidean norm of the paper's four errors in SI units, (..., 4) to (...): the simplest reading of its "norm
+    error"."""
     return np.asarray(np.linalg.norm(errors, axis=-1))

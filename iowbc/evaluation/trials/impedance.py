@@ -38,11 +38,9 @@ def impedance(force: Array, position: Array, frequency: float, dt: float) -> com
 
 
 def impedance_metrics(trace: Trace, pull: PlannedPull | None) -> dict[str, float]:
-    """Impedance of the object's centre to a pull: `impedance_real`, `impedance_imag`, `impedance_magnitude` [N·s/m]
-    and `impedance_phase` [rad], from -π/2 (spring) over 0 (damper) to π/2 (mass).
-
-    The first period is excluded as transient. NaN without a pull, or if the trial ended before the end of the pull.
-    """
+    """Impedance of the object's centre to a pull after its first period: `impedance_real`, `_imag`, `_magnitude`
+    [N·s/m] and `_phase` [rad], from -π/2 (spring) over 0 (damper) to π/2 (mass). NaN without a pull, or if the trial
+    ended before its end."""
     value = complex(np.nan, np.nan)
     if pull is not None:
         period = 1.0 / pull.frequency
@@ -61,10 +59,8 @@ def impedance_metrics(trace: Trace, pull: PlannedPull | None) -> dict[str, float
 
 
 def apparent(frequency: Array, value: Array) -> Apparent:
-    """Mass, spring and damper fitted to impedances `value` (k,), complex, at frequencies (k,) [Hz].
-
-    Least squares in Z = c + i (ω m - k / ω). With fewer than two frequencies, mass and stiffness are undetermined: NaN.
-    """
+    """Mass, spring and damper fitted to impedances `value` (k,), complex, at frequencies (k,) [Hz], by least squares in
+    Z = c + i (ω m - k / ω). With fewer than two frequencies, mass and stiffness are undetermined: NaN."""
     angular = 2.0 * np.pi * frequency
     if len(np.unique(frequency)) < 2:
         return Apparent(np.nan, float(np.mean(value.real)), np.nan)

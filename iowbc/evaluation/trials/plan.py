@@ -40,9 +40,8 @@ class Trial:
     suite: str
     """Name of its table: kind, partner and, for sweeps without the evaluation's disturbances, "undisturbed"."""
     case: str
-    """Name within the suite. Sweeps: name of the suite, or "no object"; compliance: behaviour of the partner or name of
-    the blocked crate; impedance: such as "x 0.5 Hz"; map: such as "μ 0.06"; pushes: direction, with ", walking" if the
-    robot walks."""
+    """Sweeps: name of the suite, or "no object"; compliance: the partner's behaviour or the blocked crate; impedance:
+    such as "x 0.5 Hz"; map: such as "μ 0.06"; pushes: direction, with ", walking" if the robot walks."""
     mass: float
     """Object mass [kg]; 0 without one."""
     number: int

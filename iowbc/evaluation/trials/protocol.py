@@ -58,8 +58,7 @@ def _with_trial_scenes(recipe: Recipe) -> Recipe:
 
 
 def evaluated_policy(world: Specification, folder: Path | None) -> Policy:
-    """The policy of `eval.policy`: a trained policy, the model-based baseline, or a public controller; `folder`:
-    artifact of the stage that trained it, or None."""
+    """The policy of `eval.policy`: trained (`folder`: artifact of its stage), model-based, or a public controller."""
     robot, recipe = load_robot(world.robot), world.recipe
     if folder is not None:
         return load_policy(folder, full_layout(recipe, robot).describe())
@@ -98,8 +97,7 @@ class Protocol:
     total: int = field(init=False, default=0)
 
     def run(self) -> pd.DataFrame:
-        """All trials, one row each, by suite, mass and order of play: the table of `trials.parquet`. Raises Interrupted
-        when interrupted."""
+        """All trials, one row each, by suite, mass and order of play, as in `trials.parquet`. Raises Interrupted."""
         recipe = self.world.recipe
         sweeps = planned_sweeps(recipe)
         named = [trial for sweep in sweeps for trial in sweep.named()]

@@ -22,10 +22,8 @@ BY_LOAD = ("survived", "succeeded", *ERRORS)
 
 
 def quick_trials(world: Specification, scene: str, masses: Sequence[float], count: int, seed: int) -> list[Trial]:
-    """`count` trials of a scene's commands at each mass [kg], without partner and disturbances.
-
-    `seed`: of the first trial, without split offset, so that the trials belong to the development split.
-    """
+    """`count` trials of a scene's commands at each mass [kg], without partner and disturbances. `seed`: of the first
+    trial, without split offset, so that the trials belong to the development split."""
     scripts = [script_for(world.recipe, scene, seed + number) for number in range(count)]
     fixed = UNDISTURBED | {"partner_share": 0.0}
     return [
@@ -70,12 +68,9 @@ class QuickEvaluation:
 
 def figures(rows: Sequence[Mapping[str, Any]], check: Check) -> dict[str, float]:
     """Means over trials: survived, succeeded, transport, weight_in_hands, upright (fraction of the time), four errors
-    up to the end of each trial, and `score`.
-
-    The score of a trial, in [0, 1], is the fraction of the time upright times the mean over the four errors of
-    1 / (1 + error / scale), which is 1 without error and 1/2 at its scale (`check.scales`). A trial that is not
-    survived is also multiplied by `check.fall`.
-    """
+    up to the end of each trial, and `score` in [0, 1]: the fraction of the time upright times the mean over the four
+    errors of 1 / (1 + error / scale), which is 1/2 at the scale (`check.scales`); if not survived also times
+    `check.fall`."""
     columns = {name.removesuffix("_robot"): np.array([row[name] for row in rows], np.float64) for name in FIGURES}
     means = {name: float(np.nanmean(own)) if np.isfinite(own).any() else 0.0 for name, own in columns.items()}
     quality = [np.mean(1.0 / (1.0 + np.array([row[name] for name in ERRORS]) / check.scales)) for row in rows]

@@ -65,10 +65,8 @@ def play_episodes(
     interrupted: Callable[[], bool] = lambda: False,
     progress: Callable[[float], None] = lambda seconds: None,
 ) -> list[Outcome]:
-    """Play each episode to its end; returns the outcomes in order, independent of `workers`.
-
-    progress: receives the time reached within the episodes [s]. Raises Interrupted once `interrupted()` is true.
-    """
+    """Play each episode to its end; returns the outcomes in order, independent of `workers`. `progress` receives the
+    time reached within the episodes [s]. Raises Interrupted once `interrupted()` is true."""
     with playing(world, episodes, workers) as environment:
         return play_in(environment, policy, interrupted, progress)
 
@@ -80,10 +78,8 @@ def play_in(
     progress: Callable[[float], None] = lambda seconds: None,
     look: Callable[[float], None] = lambda seconds: None,
 ) -> list[Outcome]:
-    """Play the episodes of an existing environment; see `play_episodes`.
-
-    look: called with the time [s] after the reset and after each step until the first episode ends.
-    """
+    """Play the episodes of an existing environment; see `play_episodes`. `look` receives the time [s] after the reset
+    and after each step until the first episode ends."""
     count, dt = environment.num_envs, environment.period
     layout = environment.layout
     observation = environment.reset()
@@ -129,11 +125,9 @@ def trace_of(recorded: Mapping[str, Array], index: int, steps: int, dt: float) -
 
 
 class PolicyInBatch:
-    """Policy for some environments, evaluated in a batch of fixed size with these environments in given rows.
-
-    The rounding of matrix products depends on their shape. At a fixed size, a trial is bit-identical whichever other
-    trials are in its batch.
-    """
+    """Policy for some environments, evaluated in a batch of fixed size with these environments in given rows. The
+    rounding of matrix products depends on their shape: at a fixed size, a trial is bit-identical whichever others are
+    in its batch."""
 
     def __init__(self, policy: Policy, size: int, places: NDArray[np.int64]) -> None:
         """`places` (n,): rows of the environments in the batch of `size`."""

@@ -17,10 +17,8 @@ from iowbc.task.episodes import Episode
 
 
 def trial_row(recipe: Recipe, robot: Robot, trial: Trial, outcome: Outcome) -> dict[str, Any]:
-    """One row of the long table: trial, outcome, metrics, random draws, and the episode for a replay.
-
-    Metrics are rounded to single precision, which halves the file.
-    """
+    """One row of the long table: trial, outcome, metrics, random draws, and the episode for a replay. Metrics are
+    rounded to single precision, which halves the file."""
     episode, fixed = trial.episode, trial.episode.fixed
     measured = trial_metrics(recipe, robot, episode, outcome)
     metrics = {name: float(np.float32(value)) for name, value in measured.items()} | {"seconds": outcome.seconds}
@@ -77,10 +75,8 @@ def succeeded(success: Success, kind: str, metrics: dict[str, float], *, blocked
 
 
 def transported(asked: Success | Acceptance, metrics: dict[str, float], transport: float | None = None) -> bool:
-    """True if robot and object cover enough of the path, with enough weight in the hands, and stay together.
-
-    transport: sufficient fraction of the path, default that of `asked`.
-    """
+    """True if robot and object cover enough of the path, with enough weight in the hands, and stay together. transport:
+    sufficient fraction of the path, default that of `asked`."""
     least = asked.transport if transport is None else transport
     shares = (
         (metrics["transport_robot"], least),
