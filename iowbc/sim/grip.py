@@ -14,10 +14,8 @@ from iowbc.sim.shapes import measured
 
 
 class Grip:
-    """Elastic, damped and slipping torsion between hands and object in n simulations, held over a control period.
-
-    The angle is the integral of the rate at which the object turns against the hands, cut where the palms slip.
-    """
+    """Elastic, damped and slipping torsion between hands and object in n simulations, held over a control period. Its
+    angle is the integral of the rate at which the object turns against the hands, cut where the palms slip."""
 
     def __init__(self, batch: Any, layout: ModelIndex, thing: Object, grasp: Grasp, period: float) -> None:
         self._layout, self._grasp, self._period = layout, grasp, period
@@ -27,11 +25,8 @@ class Grip:
         self.angle, self.rate = np.zeros(count), np.zeros(count)
 
     def twist(self, mass: Array, slip_force: Array, connected: Array) -> Array:
-        """Torque of the hands on the object over the next period, (n, 3) [N·m].
-
-        `mass` (n,): inertial mass of the object [kg]; `slip_force` (n,) of each hand [N]; `connected` (n, 2): 1 for
-        hands that hold.
-        """
+        """Torque of the hands on the object over the next period, (n, 3) [N·m]. `mass` (n,): inertial [kg];
+        `slip_force` (n,): of each hand [N]; `connected` (n, 2): 1 for hands that hold."""
         hands = self._sites[:, self._layout.grips]
         axis = hands[:, 0] - hands[:, 1]
         axis /= (np.sqrt(np.vecdot(axis, axis)) + TINY)[:, None]

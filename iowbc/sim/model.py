@@ -33,10 +33,8 @@ CONES = {"pyramidal": mujoco.mjtCone.mjCONE_PYRAMIDAL, "elliptic": mujoco.mjtCon
 
 
 def scene_spec(robot: Robot, physics: Physics, scene: Scene, timing: Timing, *, dressed: bool) -> Any:
-    """The editable description. With `dressed`, visual geometry too; without, only what moves or touches.
-
-    Constraints are solved with sparse Jacobians: the same trajectories to rounding, in 5 to 10 % less time.
-    """
+    """The editable description, `dressed` with visual geometry, or only what moves or touches. Constraints are solved
+    with sparse Jacobians: the same trajectories to rounding, in 5 to 10 % less time."""
     spec = mujoco.MjSpec.from_file(str(robot.mjcf))
     option = spec.option
     option.timestep = physics.timestep
@@ -92,10 +90,8 @@ def compile_scene(robot: Robot, physics: Physics, scene: Scene, timing: Timing) 
 
 def require_stable(model: Any, robot: Robot, timing: Timing) -> None:
     """Raises ValueError where joint damping, computed from the state before a physics step, passes 1 as kd dt / I: a
-    speed would then change sign at every step.
-
-    I: effective inertia of the joint with all others free, 1 / (M⁻¹)_jj, in the default posture.
-    """
+    speed would then change sign at every step. I: effective inertia of the joint with all others free in the default
+    posture, 1 / (M⁻¹)_jj."""
     data = mujoco.MjData(model)
     count = len(robot.joints)
     data.qpos[7 : 7 + count] = robot.default_position
@@ -133,10 +129,8 @@ def _add_motors(spec: Any, robot: Robot, timing: Timing) -> None:
 
 
 def _touches(geom: Any, shape: bool, body_contact: str) -> tuple[int, int]:
-    """Contact bits of a link's geom: its own and those it touches; `shape`: whether it is a collision shape.
-
-    Hands and forearms hold the object with palms or grips, and do not touch it themselves.
-    """
+    """Contact bits of a link's geom: its own and those it touches; `shape`: whether it is a collision shape. Hands and
+    forearms hold the object with palms or grips, and do not touch it themselves."""
     links = (geom.contype, geom.conaffinity & ~OBJECT_BIT) if body_contact == "everything" else (0, 0)
     solid = shape and body_contact != "nothing" and not any(part in geom.parent.name for part in HOLDING)
     return links[0], links[1] | (OBJECT_BIT if solid else 0)

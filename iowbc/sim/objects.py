@@ -33,9 +33,7 @@ def add_object(
     spec: Any, robot: Robot, scene: Scene, thing: Object, timing: Timing, *, touched: bool, dressed: bool
 ) -> None:
     """Body `object` with the scene's nominal mass, its joints, the hands with its grips or the palms that touch it.
-
-    `touched`: links other than the palms may touch it too; `dressed`: with visual geometry.
-    """
+    `touched`: links other than the palms may touch it too; `dressed`: with visual geometry."""
     shape = measured(thing)
     inertial = {"mass": thing.mass, "ipos": OFF_CENTRE, "inertia": shape.principal * thing.mass, "iquat": shape.turn}
     place = [0.0, 0.0, CLEARANCE - shape.low[2]]

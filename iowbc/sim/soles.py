@@ -58,10 +58,8 @@ class Soles:
         return spatial[..., 3:] + rotations.cross(spatial[..., :3], place)
 
     def _margin(self, loaded: Array, pressure: Array) -> Array:
-        """Distance of the centres of pressure from the edge of the sole [m]; zero in the air.
-
-        Never negative: forces are those of the last physics step, and the sole has moved since.
-        """
+        """Distance of the centres of pressure from the edge of the sole [m]; zero in the air. Never negative: forces
+        are those of the last physics step, and the sole has moved since."""
         away = pressure + self._com - self._sites[:, self._layout.soles]
         place = rotations.rotate_inverse(self._quaternion[:, self._layout.feet], away)[..., :2]
         margin: Array = np.min(self._distances - np.einsum("fsk,nfk->nfs", self._normals, place), axis=-1)

@@ -24,10 +24,8 @@ class Timing:
         return self.substeps * self.longest_latency + 1
 
     def delay(self, latency: Array) -> Array:
-        """Delay of targets in MuJoCo for a latency [control periods], any shape [s].
-
-        A whole number of physics steps, less half of one: targets are read by time, and times are rounded.
-        """
+        """Delay of targets in MuJoCo for a latency [control periods], any shape [s]: whole physics steps, less half of
+        one, because targets are read by time, and times are rounded."""
         require_latency(latency, self.longest_latency)
         steps = np.round(latency * self.substeps)
         return np.where(steps > 0.0, (steps - 0.5) * self.timestep, 0.0)

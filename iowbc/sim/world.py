@@ -110,10 +110,8 @@ class World:
         self._object_part = (thing / (thing + self.robot_mass))[:, None]
 
     def reset(self, ids: Indices, joint_position: Array, pitch: Array, drawn: Mapping[str, Array]) -> None:
-        """Robot in the posture, lowest sole corner on the ground; object in the hands or crate in front of them.
-
-        `ids` (k,) in ascending order; all else has a row for each.
-        """
+        """Robot in the posture, lowest sole corner on the ground; object in the hands or crate in front of them. `ids`
+        (k,) in ascending order; all else has a row for each."""
         yaw = drawn["start_yaw"]
         self.batch.reset(ids, stage=NOTHING)
         self.fields.write(ids, drawn)

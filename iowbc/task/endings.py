@@ -66,19 +66,15 @@ def lagging(lag: Array, heading_error: Array, followable: Mask, termination: Ter
 
 
 def dropped(motion: Motion, place: Array, held: Mask, grasped: Mask, termination: Termination) -> Mask:
-    """A held object out of both hands, or too far from its place in the grasp, (n,).
-
-    place: the object's place from the base, heading frame, (n, 3) [m]; grasped: hands that hold, (n, 2).
-    """
+    """A held object out of both hands, or too far from its place in the grasp, (n,). place: the object's place from the
+    base, heading frame, (n, 3) [m]; grasped: hands that hold, (n, 2)."""
     distance = np.sqrt(np.square(motion.object_offset - place).sum(axis=1))
     return held & (~grasped.any(axis=1) | (distance > termination.object_distance))
 
 
 def lost(motion: Motion, place: Array, pushed: Mask, termination: Termination) -> Mask:
-    """A pushed object too far to the side of the hands, (n,).
-
-    place: the middle of the hands from the base, heading frame, (n, 3) [m].
-    """
+    """A pushed object too far to the side of the hands, (n,); place: their middle from the base, heading frame, (n, 3)
+    [m]."""
     if termination.object_beside is None:
         return np.zeros(len(pushed), np.bool_)
     return pushed & (np.abs(motion.object_offset - place)[:, 1] > termination.object_beside)

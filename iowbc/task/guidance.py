@@ -30,10 +30,8 @@ class Guidance:
         pushing: Mask,
         scripts: Sequence[CommandScript | None],
     ) -> None:
-        """`scenes`: scene of each environment, by name.
-
-        `holding`: those that begin with an object in the hands, `pushing`: those with a crate in front of them, (n,).
-        """
+        """`scenes`: scene of each environment; `holding`: those that begin with an object in the hands, `pushing`: with
+        a crate in front of them, (n,)."""
         task = specification.recipe.task
         self._period = 1.0 / task.control_frequency
         self.references = ReferenceLayer(robot, task.references, specification.rg)
@@ -78,10 +76,7 @@ class Guidance:
         memory.support[:] = self.references.with_stride(posture, memory.command, phase, stepping, feedback)
 
     def targets(self, memory: EpisodeState, action: Array) -> Array:
-        """Joint targets of an action (n, 15) in the next step, (n, joints) [rad]: θ_S_ref + scale·a, θ_I_ref.
-
-        The action is within its bounds.
-        """
+        """Joint targets of an action (n, 15) within its bounds, (n, joints) [rad]: θ_S_ref + scale·a, θ_I_ref."""
         target = np.empty((len(action), self._joints))
         target[:, self._support] = memory.support + self._scale * action
         self._frames = self.references.arms.frames(memory.arms)

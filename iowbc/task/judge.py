@@ -58,11 +58,8 @@ class Judge:
         disturbed: Mask,
         resistance: Array,
     ) -> Judgement:
-        """Evaluates the last step, made with an action (n, 15).
-
-        `place`: target position of a held object, (n, 3) [m]; `disturbed`: whether an impulse or a push acted, (n,);
-        `resistance`: rolling resistance of a crate, (n,) [N].
-        """
+        """Evaluates the last step, made with an action (n, 15). `place`: target position of a held object, (n, 3) [m];
+        `disturbed`: whether an impulse or a push acted, (n,); `resistance`: rolling resistance of a crate, (n,) [N]."""
         moved = self.motion(state)
         self._filter(memory, moved, resistance * (1.0 - state.partner_share))
         error = wrapped(moved.heading - memory.heading_reference)

@@ -34,10 +34,8 @@ class CheckedFunction:
     function: Callable[[Any], Any]
 
     def __call__(self, source: Any, *shapes: ArrayShape, excused: Mask | None = None) -> Array:
-        """Values of the function, of one of the shapes, (n, ...). `excused`: rows that need not be finite, (n,).
-
-        Raises StageFailed if the function raises or returns anything else.
-        """
+        """Values of the function, of one of the shapes, (n, ...). `excused`: rows that need not be finite, (n,). Raises
+        StageFailed if the function raises or returns anything else."""
         try:
             found = np.asarray(self.function(source), np.float64)
         except Exception as error:
@@ -57,10 +55,7 @@ class CheckedFunction:
 
 
 def load_function(path: str, own: CustomFunction, contract: str) -> CheckedFunction:
-    """Executes the file of a function. `path`: in the recipe; `contract`: see `CheckedFunction`.
-
-    Raises StageFailed where it cannot be used.
-    """
+    """Executes the file of a function. `path`: in the recipe; `contract`: see `CheckedFunction`. Raises StageFailed."""
     where = f"{path}: {own.module.path}"
     try:
         module = _executed(own.module)

@@ -19,9 +19,7 @@ CONTRACT = (
 
 def own_parts(recipe: Observation) -> tuple[Part[Truth], ...]:
     """The user-defined parts in alphabetical order, because cache keys do not depend on their order in the recipe.
-
-    Raises StageFailed for a name that is taken.
-    """
+    Raises StageFailed for a name that is taken."""
     for path, text in taken_names(recipe):
         raise StageFailed(f"{path}: {text}")
     return tuple(_part(name, recipe.own[name]) for name in sorted(recipe.own))

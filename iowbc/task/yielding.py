@@ -9,10 +9,8 @@ from iowbc.task.rewards.terms import SLOW
 
 def excess_force(hand_force: Array, command: Array, needed: Array) -> Array:
     """Horizontal force of the object on the hands beyond what the transport needs, (n, 2) [N], heading frame.
-
     hand_force: on both hands together, (n, 2 or 3) [N]; command: planar velocity, (n, 2) [m/s]; needed: resistance that
-    the hands overcome along the command, (n,) [N].
-    """
+    the hands overcome along the command, (n,) [N]."""
     speed = np.sqrt(np.vecdot(command, command))
     return hand_force[:, :2] + command * (needed / np.maximum(speed, SLOW))[:, None]
 

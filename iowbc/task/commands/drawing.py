@@ -13,10 +13,8 @@ from iowbc.recipe.task.commands import Commands
 def draw_goals(
     commands: Commands, key: Keys, difficulty: Mapping[str, Array], *, pushing: Mask, walking: Mask
 ) -> Array:
-    """Goals (n, 11), a pure function of the keys (n,); ranges scaled by `iowbc.task.curriculum.difficulty`.
-
-    pushing: environments with a crate in front of them, (n,); walking: those whose episode commands velocities, (n,).
-    """
+    """Goals (n, 11), a pure function of the keys (n,); ranges scaled by `iowbc.task.curriculum.difficulty`. pushing:
+    environments with a crate in front of them, (n,); walking: those whose episode commands velocities, (n,)."""
     goals = np.empty((len(key), len(COMMAND)))
     goals[:, :3] = _velocities(commands, key, difficulty, pushing) * walking[:, None]
     goals[:, 3:] = _posture(commands, key, difficulty["posture"])

@@ -140,8 +140,7 @@ SIGNALS = RECORDED | {
     "level": Signal(4, lambda s: s.memory.level),
     "time": Signal(1, lambda s: s.memory.steps * s.period),
 }
-"""All signals: also reasons for the end of an episode, gait phase in [0, 1), curriculum levels, time in the episode
-[s]."""
+"""All signals: also reasons for the end of an episode, gait phase in [0, 1), curriculum levels, episode time [s]."""
 
 
 def signal_sizes(robot: Robot, *, planned: bool) -> dict[str, int]:

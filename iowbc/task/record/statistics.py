@@ -89,12 +89,9 @@ class Statistics:
         """Last values of `EPISODIC` and the errors, kept for intervals without data."""
 
     def read(self, counters: Array, terms: Array, levels: Array) -> dict[str, float]:
-        """Statistics from counters (n, len(COUNTERS)), sums of reward terms (n, terms) and levels (n, axes); resets
-        counters and sums to zero.
-
-        Rewards are means per second, terminations and falls fractions of the episodes that ended, divergences a count,
-        errors means of absolute values by scene and kind of command.
-        """
+        """Statistics from counters (n, len(COUNTERS)), sums of reward terms (n, terms) and levels (n, axes); zeroes the
+        first two. Rewards are means per second, terminations and falls fractions of the episodes that ended,
+        divergences a count, errors means of absolute values by scene and kind of command."""
         total = dict(zip(COUNTERS, counters.sum(axis=0).tolist(), strict=True))
         steps = max(total["steps"], 1.0)
         rewards = dict(zip(self._terms, (terms.sum(axis=0) / (steps * self._period)).tolist(), strict=True))

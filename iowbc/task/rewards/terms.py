@@ -20,9 +20,7 @@ def squared_norm(values: Array) -> Array:
 
 def progress(velocity: Array, command: Array) -> Array:
     """v_sys along the commanded velocity, clipped to ± its size, (n,) [m/s]; (n, 2), heading frame. Zero without one.
-
-    Its slope is the same wherever the robot is too slow, unlike that of a kernel, which is flat far from the command.
-    """
+    Unlike a kernel's, its slope is the same wherever the robot is too slow."""
     speed = np.hypot(command[:, 0], command[:, 1])
     along = np.vecdot(velocity, command) / np.maximum(speed, SLOW)
     return along.clip(-speed, speed)

@@ -70,11 +70,8 @@ class Setup:
 
 
 def scene_of(count: int, shares: Iterable[tuple[str, float]]) -> list[str]:
-    """Scene of each of `count` environments, in given shares rounded to whole environments.
-
-    Environments of one scene follow one another: most worker processes then hold one scene alone, and their arrays are
-    copied as a block.
-    """
+    """Scene of each of `count` environments, in given shares rounded to whole environments, one scene after another:
+    most worker processes then hold one scene alone, and their arrays are copied as a block."""
     names, given = zip(*shares, strict=True)
     weights = np.array(given)
     wanted = count * weights / weights.sum()
