@@ -136,8 +136,7 @@ class Simulation:
         return gathered
 
     def hold(self, fixed: Mapping[str, Array], which: Indices | slice = EVERY) -> None:
-        """Holds quantities of some environments at values (k,) from the next reset on; NaN draws. Other held quantities
-        stay held."""
+        """Holds quantities of some environments at values (k,) from the next reset on, others as before; NaN draws."""
         unknown = [name for name in fixed if name not in self.drawn]
         if unknown:
             raise KeyError(f"no randomised quantities {unknown}; there are: {', '.join(sorted(self.drawn))}")

@@ -14,8 +14,7 @@ from iowbc.task.rewards.terms import progress
 def follow(
     memory: EpisodeState, target: Array, error: Array, disturbed: Mask, termination: Termination, period: float
 ) -> None:
-    """Adds the last step, of `period` [s], to the sums; `target`: target velocity, heading frame, (n, 2) [m/s];
-    `error`: heading error, (n,) [rad]."""
+    """Adds a step of `period` [s]; `target`: velocity, heading frame, (n, 2) [m/s]; `error` of heading, (n,) [rad]."""
     speed = np.hypot(target[:, 0], target[:, 1])
     along = progress(memory.filtered_velocity[:, :YAW_RATE], target)
     memory.walked += memory.command[:, VELOCITY].any(axis=1)

@@ -27,8 +27,7 @@ FIGURES = ("success", *ERRORS, "norm")
 
 Values = NDArray[np.float64]
 Block = dict[str, Values]
-"""Trials of a variant in one suite, by training seed: (masses or cases, trials, metrics in order of `FIGURES`). Errors
-are infinite if the trial was not survived."""
+"""By training seed: (masses or cases, trials, metrics in order of `FIGURES`); errors are infinite unless survived."""
 
 
 def interquartile_table(trials: pd.DataFrame) -> Table | None:

@@ -35,8 +35,7 @@ class Trial:
     """One trial: its place in the tables and its episode."""
 
     kind: str
-    """"lifting", "pushing", "squeezing", "heavy", "stagnation", "robustness", "pushes", "compliance", "impedance",
-    "map", or the name of another sweep."""
+    """A sweep such as "lifting", or "heavy", "stagnation", "robustness", "pushes", "compliance", "impedance", "map"."""
     suite: str
     """Name of its table: kind, partner and, for sweeps without the evaluation's disturbances, "undisturbed"."""
     case: str

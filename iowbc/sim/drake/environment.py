@@ -33,8 +33,7 @@ class DrakeEnvironment:
     """A plant with its state and inputs."""
 
     def __init__(self, model: Any, settings: Drake, layout: ModelIndex, *, implicit: bool, yaw_arm: float) -> None:
-        """`implicit`: the damping of the joint control is integrated implicitly; `yaw_arm`: see
-        `iowbc.recipe.simulation.scene.Scene` [m]."""
+        """`implicit`: the damping of joint control is integrated implicitly; `yaw_arm`: of the `Scene` [m]."""
         self._model, self._implicit = model, implicit
         self._slow, self._arm = settings.stiction, yaw_arm
         self.plant = plant = Plant(model, settings)

@@ -71,8 +71,7 @@ class Trace:
     """Control period [s]."""
     system_velocity: Annotated[Array, Signal(3, lambda s: s.motion.system_velocity)]
     commanded_velocity: Annotated[Array, Signal(3, lambda s: s.memory.command[:, VELOCITY])]
-    """Velocity of the common centre of mass of robot and object, and clamped command: v_x, v_y [m/s], yaw rate [rad/s],
-    heading frame, (T, 3)."""
+    """v_sys and the clamped command: v_x, v_y [m/s], yaw rate [rad/s], heading frame, (T, 3)."""
     heading: Annotated[Array, Signal(1, lambda s: s.motion.heading)]
     heading_reference: Annotated[Array, Signal(1, lambda s: s.memory.heading_reference)]
     """Yaw of the base, and integrated commanded yaw rate, (T,) [rad]."""

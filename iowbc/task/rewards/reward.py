@@ -69,8 +69,7 @@ def kernel(squared_error: Array, width: float | Array) -> Array:
 
 
 def load_terms(recipe: Reward) -> dict[str, Callable[[Step], Array]]:
-    """User-defined terms that have a weight, by dotted path; executes their file, which only training environments do.
-    Raises StageFailed for one that cannot be used."""
+    """User-defined terms with a weight, by path; executes their file. Raises StageFailed if one cannot be used."""
     return {f"own.{name}": _own_term(f"task.reward.own.{name}", term) for name, term in recipe.own_terms.items()}
 
 

@@ -218,8 +218,7 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
         )
 
     def set_attr(self, attr_name: str, value: Any, indices: Indices = None) -> None:
-        """Sets the curriculum `level` of environments, from their next episode on: a number for all, or a mapping of
-        axes to numbers that leaves the others."""
+        """Sets the curriculum `level`, from the next episodes on: a number for all axes, or numbers of some by name."""
         if attr_name != "level":
             raise AttributeError(f"{attr_name!r} of an environment cannot be set; `level` can")
         levels = self._levels()
