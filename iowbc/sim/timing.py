@@ -17,11 +17,8 @@ class Timing:
                 f"a control period of {period:g} s is no whole number of physics steps of {timestep:g} s; "
                 f"choose the time step as {period:g} s divided by a whole number"
             )
-
-    @property
-    def kept_targets(self) -> int:
+        self.kept_targets = self.substeps * longest_latency + 1
         """Number of targets to keep: one per physics step of the longest latency, and the newest."""
-        return self.substeps * self.longest_latency + 1
 
     def delay(self, latency: Array) -> Array:
         """Delay of targets in MuJoCo for a latency [control periods], any shape [s]: whole physics steps, less half of

@@ -24,6 +24,8 @@ class Schedule:
         """`environments`: global indices, (n,); `trials`: one per environment; None draws episodes at random."""
         n = len(environments)
         self._task, self._memory, self._trials, self._period = task, memory, trials, 1.0 / task.control_frequency
+        self.repeats = trials is not None
+        """True if a reset begins the same episodes again."""
         self.seeds, self.streams = np.full(n, seed, np.uint64), environments
         if trials is not None:
             self.seeds = np.array([episode.seed for episode in trials], np.uint64)
@@ -44,11 +46,6 @@ class Schedule:
     def planned(self, part: str) -> list[Any]:
         """A part of the episode that is planned for each environment, such as its script, if it has one."""
         return [None] * len(self.key) if self._trials is None else [getattr(episode, part) for episode in self._trials]
-
-    @property
-    def repeats(self) -> bool:
-        """True if a reset begins the same episodes again."""
-        return self._trials is not None
 
     def reseed(self, seeds: Keys) -> None:
         """Reseeds all random number streams from seeds (n,)."""
