@@ -114,8 +114,7 @@ class Statistics:
     def _carry_errors(self, counters: Array) -> None:
         """Means of the errors of each scene, standing and walking; the last ones where there was no such step."""
         kept = self.carried[self._kept :].reshape(len(self._scenes), len(KINDS), len(ERRORS))
-        first = COUNTERS.index(f"{KINDS[0]}/steps")
         for place, rows in enumerate(self._scenes.values()):
-            sums = counters[rows, first:].sum(axis=0).reshape(len(KINDS), 1 + len(ERRORS))
+            sums = counters[rows, STANDING.start :].sum(axis=0).reshape(len(KINDS), 1 + len(ERRORS))
             stepped = sums[:, 0] > 0.0
             kept[place, stepped] = sums[stepped, 1:] / sums[stepped, :1]

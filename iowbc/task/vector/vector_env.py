@@ -209,8 +209,7 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
         if attr_name == "scene":
             return [self._scenes[row] for row in rows]
         if attr_name == "level":
-            levels = self._levels()
-            return [dict(zip(AXES, levels[row].tolist(), strict=True)) for row in rows]
+            return [dict(zip(AXES, level, strict=True)) for level in self._levels()[list(rows)].tolist()]
         if attr_name in ("observation_space", "action_space", "layout"):
             return [getattr(self, attr_name) for _ in rows]
         raise AttributeError(
