@@ -8,7 +8,7 @@ from iowbc.recipe.section import Section
 
 
 class Execution(Section):
-    """Execution of a recipe on a machine; not part of any key."""
+    """Execution of a recipe on this machine; never changes a result, and is not part of any key."""
 
     workers: int | None = Field(default=None, ge=1, le=1024)
     """Worker processes of the parallel stages; empty: all available cores. `--workers` overrides it."""

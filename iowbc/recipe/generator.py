@@ -36,7 +36,6 @@ class Sampling(Section):
     torso_share: Share = 0.35
     """Fraction from wrist positions in the torso frame, as when a load leans with the trunk; the rest is uniform."""
     wrists: WristRegion = WristRegion()
-    """Region of those wrist positions."""
     joint_ranges: dict[str, Interval] = Field(default={})
     """Narrower ranges [rad] of arm joints for the uniform postures, e.g. `left_elbow_joint: {low: 0, high: 1}`."""
     boundary_share: Share = 0.06
@@ -228,9 +227,7 @@ class Fit(Section):
     length_scale: Positive = 0.1
     """Length [m] that weighs as much as one radian in that loss."""
     gates: FitGates = FitGates()
-    """Limits on held-out data."""
     smoothness: SmoothnessCheck = SmoothnessCheck()
-    """Measurement of smoothness."""
 
 
 class ReferenceGenerator(Section):
@@ -241,16 +238,9 @@ class ReferenceGenerator(Section):
     height: Literal["pelvis", "com"] = "pelvis"
     """Meaning of the commanded height: the pelvis (0.5 to 0.8 m on the G1), or the centre of mass (paper)."""
     sampling: Sampling = Sampling()
-    """Arm postures and commands to label."""
     problem: PostureProblem = PostureProblem()
-    """Costs and physical limits."""
     ocp: OptimalControl = OptimalControl()
-    """The optimal control problem over a horizon."""
     gates: LabelGates = LabelGates()
-    """Acceptance limits of each label."""
     crosscheck: CrossCheck = CrossCheck()
-    """Comparison of static labels with optimal control."""
     feasible: FeasibleRegion = FeasibleRegion()
-    """The feasible map."""
     fit: Fit = Fit()
-    """The network."""

@@ -43,23 +43,14 @@ class Recipe(Section):
     stages: tuple[StageName, ...] = Field(default=CONTROLLER, min_length=1)
     """Stages of this experiment; they run in the order of the pipeline. `skill` and `skill-eval` run only if listed."""
     rg: ReferenceGenerator = ReferenceGenerator()
-    """The reference generator: its dataset and its network."""
     simulation: SimulationSettings = SimulationSettings()
-    """Simulation settings: physics, scenes, partner, randomization, sensing."""
     task: Task = Task()
-    """The Markov decision process: commands, observation, action, reward, terminations, curriculum."""
     teacher: Teacher = Teacher()
-    """PPO with privileged information."""
     distill: Distillation = Distillation()
-    """On-policy distillation of the teacher into the student."""
     eval: Evaluation = Evaluation()
-    """Trials of the trained policy."""
     export: Export = Export()
-    """The ONNX graph and its checks."""
     skill: Skill = Skill()
-    """The skill layer: the Markov game of a robot and a human, its training and evaluation."""
     execution: Execution = Execution()
-    """Execution on this machine; never changes a result, and is not part of any key."""
 
     @property
     def deployed(self) -> Self:

@@ -176,7 +176,7 @@ class Encoder(Section):
 
 @functools.cache
 def sentences(section: type[BaseModel]) -> dict[str, str]:
-    """Attribute docstrings of a section and its bases, by field name.
+    """Attribute docstrings of a section and its bases, by field name; of a subsection without one, its own docstring.
 
     They are read on demand: pydantic's `use_attribute_docstrings` reads all sources whenever a command starts.
     """
@@ -188,6 +188,10 @@ def sentences(section: type[BaseModel]) -> dict[str, str]:
         match pair:
             case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(value=ast.Constant(value=str(text))):
                 found[name] = inspect.cleandoc(text)
+    for name, field in section.model_fields.items():
+        kind = field.annotation
+        if name not in found and isinstance(kind, type) and issubclass(kind, Section):
+            found[name] = inspect.cleandoc(kind.__doc__ or "")
     return found
 
 

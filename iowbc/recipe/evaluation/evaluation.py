@@ -186,11 +186,9 @@ class Evaluation(Section):
     engine: Literal["mujoco", "drake"] = Field(default="mujoco", json_schema_extra=LATER)
     """Physics engine of the trials. Drake, an optional extra, runs the same trials of a policy trained in MuJoCo."""
     drake: Drake = Field(default=Drake(), json_schema_extra=LATER)
-    """Settings of Drake's integration."""
     success: Success = Success()
     """Criteria of survival and success."""
     video: Video = Field(default=Video(), json_schema_extra=COSMETIC)
-    """Videos of trials."""
 
     def problems(self) -> Problems:
         suites = {

@@ -62,7 +62,6 @@ class ModelBased(Section):
     lead: NonNegative = 0.02
     """Time by which the state is extrapolated [s]: the mean total latency of sensors and actions in simulation."""
     estimation: Estimation = Estimation()
-    """Estimation of the robot's motion."""
     friction: Positive = 0.5
     """Friction coefficient of the soles in the program; the smallest that the simulation draws."""
     sole_fraction: Share = 0.9

@@ -15,7 +15,7 @@ BEHAVIOURS: tuple[Behaviour, ...] = get_args(Behaviour)
 
 
 class Behaviours(Section):
-    """Relative frequencies of the partner's behaviours; only the proportions matter."""
+    """Relative frequencies of the partner's behaviours, drawn per episode; only the proportions matter."""
 
     path: float = Field(default=1.0, ge=0.0)
     """Follows the commanded motion and height from where the episode began, wherever the robot is."""
@@ -64,7 +64,7 @@ OWN_DRAWS: dict[str, type[Section]] = {"leader": Leader, "stopping": Stopping}
 
 
 class Tugging(Section):
-    """Periodic pulls of a partner that otherwise follows the path."""
+    """Periodic pulls of a partner that otherwise follows the path; evaluation only."""
 
     force: float = Field(default=40.0, ge=0.0)
     """Horizontal force of a pull [N]; a firm pull of one arm, half of `strongest`."""
@@ -75,7 +75,7 @@ class Tugging(Section):
 
 
 class Lagging(Section):
-    """A partner that reacts late and hardly damps."""
+    """A partner that reacts late and hardly damps; evaluation only."""
 
     delay: float = Field(default=0.6, ge=0.0, le=LONGEST_DELAY)
     """Delay behind the commanded motion [s]: twice the largest that training draws."""
@@ -103,16 +103,11 @@ class PartnerSettings(Section):
     delay: NotNegative = Distribution(low=0.05, high=0.3, nominal=0.15)
     """Delay of the partner behind the commanded motion [s], up to 10; human reaction times."""
     behaviours: Behaviours = Field(default=Behaviours(), json_schema_extra=LATER)
-    """Relative frequencies of the behaviours, drawn per episode."""
 
     leader: Leader = Field(default=Leader(), json_schema_extra=LATER)
-    """Motion of a leader."""
     stopping: Stopping = Field(default=Stopping(), json_schema_extra=LATER)
-    """Stop of a stopping partner."""
     tugging: Tugging = Field(default=Tugging(), json_schema_extra=LATER)
-    """Pulls of a tugging partner; evaluation only."""
     lagging: Lagging = Field(default=Lagging(), json_schema_extra=LATER)
-    """Reaction of a lagging partner; evaluation only."""
     pace: Distribution = Distribution(low=0.7, high=1.2, nominal=1.0)
     """Speed of a path partner relative to the commanded one: below 1 it holds back, above 1 it pulls."""
     noise: NotNegative = Distribution(low=0.0, high=8.0, nominal=0.0)

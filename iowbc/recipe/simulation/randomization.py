@@ -41,7 +41,7 @@ POSITIVE = ("link_mass_scale", "link_inertia_scale")
 
 
 class Randomization(Section):
-    """Quantities drawn at the start of each episode."""
+    """Domain randomization: quantities drawn at the start of each episode."""
 
     enabled: bool = True
     """Enable the randomization; otherwise every entry has its nominal value."""

@@ -9,7 +9,7 @@ from iowbc.recipe.section import LATER, NamedEntries, Problems, Section, Vector
 
 
 class Grasp(Section):
-    """Hold of the hands on an object."""
+    """Hold of the hands on the object in a lift scene."""
 
     kind: Literal["compliant", "contact"] = "compliant"
     """`compliant`: an elastic connection that releases above its slip force; `contact`: friction between two palms."""
@@ -91,7 +91,6 @@ class Scene(Section):
     object: Object | None = None
     """The object; empty in a free scene."""
     grasp: Grasp = Grasp()
-    """Hold on the object in a lift scene."""
     palm: Vector = (0.0, -0.03, 0.0)
     """Contact point of the left palm relative to the grip, in the hand's frame [m]; the right palm mirrors it."""
     gap: float = Field(default=0.01, ge=0.0)

@@ -81,16 +81,9 @@ class SimulationSettings(Section):
     """Simulation settings: physics, scenes, partner, randomization, sensing."""
 
     physics: Physics = Physics()
-    """Integration by MuJoCo."""
     scenes: Scenes = Scenes()
-    """Scenes by name."""
     partner: PartnerSettings = PartnerSettings()
-    """The partner at the object's far handle."""
     randomization: Randomization = Randomization()
-    """Domain randomization: quantities drawn at the start of each episode."""
     impulses: Impulses = Impulses()
-    """Impulses on the object's centre of mass."""
     pushes: Pushes = Pushes()
-    """Pushes on the base."""
     sensing: SensorNoise = SensorNoise()
-    """Measurement noise of the sensors."""

@@ -258,27 +258,18 @@ class PartnerKinds(Section):
 
 
 class Skill(Section):
-    """The Markov game of a robot and a human who transport an object together."""
+    """The skill layer: the Markov game of a robot and a human who transport an object together."""
 
     frequency: float = Field(default=5.0, gt=0.0)
     """Decision frequency [Hz]; the control frequency is an integer multiple of it."""
     tasks: Tasks = Tasks()
-    """Transport tasks by name."""
     goal_known: float = Field(default=0.5, ge=0.0, le=1.0)
     """Fraction of the games in which the robot knows the path; in the others only the human does."""
     partners: PartnerKinds = PartnerKinds()
-    """Humans of training and evaluation."""
     robot: RobotAgent = RobotAgent()
-    """The robot's nominal command and action."""
     human: HumanAgent = HumanAgent()
-    """The human's action."""
     pursuit: PathFollowing = PathFollowing()
-    """Motion of scripted agents along the path."""
     finish: Finish = Finish()
-    """Conditions that end a game."""
     reward: GameReward = GameReward()
-    """The shared reward."""
     learning: SkillLearning = SkillLearning()
-    """Multi-agent PPO of robot and human."""
     eval: SkillEvaluation = SkillEvaluation()
-    """Comparison of skills and baselines."""

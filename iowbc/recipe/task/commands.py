@@ -32,7 +32,7 @@ class PushingVelocities(Section):
 
 
 class Commands(Section):
-    """Ranges, resampling and limits of the command [v_x, v_y, ω_yaw, H, α_pitch, Δp_left, Δp_right]."""
+    """Ranges, resampling and limits of the 11-D command [v_x, v_y, ω_yaw, H, α_pitch, Δp_left, Δp_right]."""
 
     velocity_x: Range = (-0.3, 0.6)
     """Forward velocity, heading frame [m/s]; slightly beyond the 0.5 m/s of the trials."""
@@ -49,7 +49,6 @@ class Commands(Section):
     deep_share: float = Field(default=0.1, ge=0.0, le=1.0)
     """Fraction of the standing commands with a deep lean; few, since trials stay within `pitch`."""
     pushing: PushingVelocities = PushingVelocities()
-    """Velocities in a scene with a crate to push."""
     common_offset: Vector = (0.05, 0.05, 0.08)
     """Largest common offset of both wrists, per axis of the heading frame [m]."""
     single_offset: Vector = (0.02, 0.0, 0.02)
@@ -81,4 +80,3 @@ class Commands(Section):
     resampling: PositiveRange = (3.0, 7.0)
     """Time from one command to the next [s]."""
     rates: CommandRates = CommandRates()
-    """Rate limits."""

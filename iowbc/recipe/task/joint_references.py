@@ -172,17 +172,15 @@ class GaitPrior(Section):
 
 
 class References(Section):
-    """The reference generation layer of the control loop."""
+    """Joint references computed from a command: base grasp, arm kinematics, reference generator, gait prior."""
 
     use_rg: bool = True
     """Take θ_S_ref from the reference generator; otherwise it is the constant default posture ("w/o RG")."""
     grasps: Grasps = Grasps()
-    """Base grasp of each scene."""
     lean: float = Field(default=0.3, ge=0.0)
     """Forward shift of the grasps at a torso pitch of 90° [m], proportional to the sine of the pitch. It is that of the
     chest at the height of the object's upper edge, so that the torso does not rest on the object."""
     loads: Loads = Loads()
-    """Loads that the arm references compensate in each scene."""
     largest_pitch: float | None = Field(default=None, gt=0.0, le=1.6, json_schema_extra=LATER)
     """Torso pitch to which commands are clamped, within the feasible map [rad]. The map contains all commands with a
     support posture in equilibrium; a policy may achieve less. Empty: only the map clamps."""
@@ -190,9 +188,7 @@ class References(Section):
     """Ignore commanded height and pitch in the references. This is for controllers that take velocities only: their
     torso does not follow, and the arms would reach to the wrong place."""
     arms: ArmReference = ArmReference()
-    """Arm references."""
     gait: GaitPrior = GaitPrior()
-    """Gait clock and swing."""
     torso: TorsoFeedback | None = Field(default=None, json_schema_extra=LATER)
     """Feedback of the torso's pitch on the hips; empty: none."""
     height: HeightFeedback | None = Field(default=None, json_schema_extra=LATER)

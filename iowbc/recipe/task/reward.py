@@ -174,13 +174,9 @@ class Reward(Section):
     """Sum of the terms, per second; a step's reward is the sum times the control period, plus the cost of a fall."""
 
     sync: Synchronisation = Synchronisation()
-    """Coupled motion consistency."""
     object: ObjectEquilibrium = ObjectEquilibrium()
-    """Object equilibrium."""
     smooth: Smoothness = Smoothness()
-    """Whole-body smoothness."""
     gait: GaitConstraint = GaitConstraint()
-    """Gait constraint."""
     yielding: Yielding = Field(default=Yielding(), json_schema_extra=LATER)
     """Compliance of hands and velocity."""
     without: tuple[Literal["sync", "object", "smooth", "gait"], ...] = Field(default=(), json_schema_extra=LATER)

@@ -105,18 +105,11 @@ class Task(Section):
     episode_duration: PositiveRange = (10.0, 20.0)
     """Range of the random time limit of an episode [s]; a spread desynchronizes the environments."""
     scenes: SceneShares = SceneShares()
-    """Scenes of the environments."""
     commands: Commands = Commands()
-    """The 11-D skill-level command and its sampling."""
     references: References = References()
-    """Joint references computed from a command: base grasp, arm kinematics, reference generator, gait prior."""
     action: Action = Action()
-    """The residual action."""
     observation: Observation = Observation()
-    """Observations of policy and teacher."""
     reward: Reward = Reward()
-    """Terms and weights of the reward."""
     termination: Termination = Termination()
-    """Conditions of early termination."""
     curriculum: Curriculum = Curriculum()
     """The three phases of training."""
