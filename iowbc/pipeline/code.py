@@ -1,7 +1,4 @@
-"""Digests of the modules that a stage imports, and versions of packages; with its key they determine a result.
-
-Machines whose `identity` is the same give the same results.
-"""
+"""Digests of the modules that a stage imports, and versions of packages; with its key they determine a result."""
 
 import ast
 import functools

@@ -70,10 +70,8 @@ class Planner:
         return list(dict.fromkeys([self, *(one for origin in self.origins.values() for one in origin.chain())]))
 
     def _want_whole(self, stage: Stage, borrowed: Mapping[str, Artifact | None]) -> bool:
-        """True if a stage that runs borrows artifacts that are not whole; from now on their recipes make them.
-
-        Raises `RecipeError` for one that the recipe names by its key.
-        """
+        """True if a stage that runs borrows artifacts that are not whole; from now on their recipes make them. Raises
+        `RecipeError` for one that the recipe names by its key."""
         lacking = [name for name, one in borrowed.items() if one is not None and not one.whole]
         for name in lacking:
             origin = self.origins.get((stage.name, name))
@@ -83,10 +81,8 @@ class Planner:
         return bool(lacking)
 
     def borrowed(self, stage: Stage, known: "Plans | None" = None) -> dict[str, Artifact | None]:
-        """The artifacts of other recipes that a stage reads, by their names among the inputs.
-
-        None for one that is not made yet. Raises `RecipeError` for one that is not stored, or damaged.
-        """
+        """The artifacts of other recipes that a stage reads, by their names among the inputs; None for one that is not
+        made yet. Raises `RecipeError` for one that is not stored, or damaged."""
         known, found = {} if known is None else known, dict[str, Artifact | None]()
         for name, one in stage.borrows(self.loaded.recipe).items():
             if (stage.name, name) in self.origins:
@@ -110,10 +106,8 @@ class Planner:
         return found[0]
 
     def decide(self, stage: Stage, inputs: Mapping[str, Artifact | None], *, whole: bool = False) -> StagePlan:
-        """The plan for a stage with these inputs; None is an input that would be made anew.
-
-        whole: a published artifact does not do that leaves out large files, as of the last stage with `self.whole`.
-        """
+        """The plan for a stage with these inputs; None is an input that would be made anew. whole: a published artifact
+        without large files does not do, as of the last stage with `self.whole`."""
         whole = whole or (self.whole and stage is self.stages[-1])
         unknown = [name for name, artifact in inputs.items() if artifact is None]
         ingredients = {

@@ -33,8 +33,8 @@ class EmbeddedFile(Section):
 
     @classmethod
     def taken_in(cls, file: Path, path: str) -> Self:
-        """Embed the current content of `file`; `path` is the path written in the recipe. Raises ValueError for a file
-        with another extension, or one that is unreadable, too large or empty."""
+        """Embed `file`, written `path` in the recipe. Raises ValueError for another extension, an unreadable, too large
+        or empty file."""
         if file.suffix.lower() not in cls.suffixes:
             raise ValueError(f"should be a file that ends in {' or '.join(cls.suffixes)}")
         try:

@@ -99,10 +99,8 @@ class Recipe(Section):
 
 
 def recipe_schema() -> dict[str, Any]:
-    """JSON Schema of a recipe file: the fields with their docstrings, `extends`, and the `variants` of a study.
-
-    No key is required, because sections may be partial; `iowbc plan` reports missing keys of list entries.
-    """
+    """JSON Schema of a recipe file: the fields with their docstrings, `extends`, and the `variants` of a study. No key
+    is required, because sections may be partial; `iowbc plan` reports missing keys of list entries."""
     schema = Recipe.model_json_schema()
     for definition in (schema, *schema["$defs"].values()):
         definition.pop("required", None)

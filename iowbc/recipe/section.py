@@ -133,10 +133,8 @@ class Interval(Section):
 
 
 class NamedEntries(Section, extra="allow"):
-    """Mapping of names to entries of one type: built-in entries are fields, and a recipe may add custom ones.
-
-    The type of custom entries is the annotation of `__pydantic_extra__`.
-    """
+    """Mapping of names to entries of one type: built-in entries are fields, and a recipe may add custom ones, whose
+    type is the annotation of `__pydantic_extra__`."""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -177,9 +175,7 @@ class Encoder(Section):
 @functools.cache
 def sentences(section: type[BaseModel]) -> dict[str, str]:
     """Attribute docstrings of a section and its bases, by field name; of a subsection without one, its own docstring.
-
-    They are read on demand: pydantic's `use_attribute_docstrings` reads all sources whenever a command starts.
-    """
+    They are read on demand: pydantic's `use_attribute_docstrings` reads all sources whenever a command starts."""
     bases = [base for base in section.__bases__ if issubclass(base, BaseModel) and base is not BaseModel]
     (definition,) = ast.parse(textwrap.dedent(inspect.getsource(section))).body
     assert isinstance(definition, ast.ClassDef)

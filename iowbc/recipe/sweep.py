@@ -123,11 +123,9 @@ class Sweep:
 
 
 def load_sweep(word: str, settings: Sequence[str], file: Path | None = None, most: int = MOST_POINTS) -> Sweep:
-    """The points of a sweep, all of them valid recipes. Raises `RecipeError`.
-
-    settings: `path=value` holds for all points; `path=a,b` and `path=0..4` vary it. They override the file, and of
-    several for one path the last counts.
-    """
+    """The points of a sweep, all of them valid recipes; `path=value` in settings holds for all points, `path=a,b` and
+    `path=0..4` vary it. Settings override the file, and of several for one path the last counts. Raises
+    `RecipeError`."""
     described = SweepFile() if file is None else _read_file(file)
     grid = {path: _expanded(values, f"{file}") for path, values in described.grid.items()}
     if far := [value for value in grid.get("robot", ()) if Path(str(value)).name != value]:

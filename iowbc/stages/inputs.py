@@ -6,11 +6,8 @@ from iowbc.recipe.recipe import Recipe
 
 
 def generator_stage(recipe: Recipe) -> tuple[str, ...]:
-    """`rg-fit` where a recipe fits a reference generator, else nothing.
-
-    Also where θ_S_ref is the default posture: commands are clamped to the same feasible map, so that variants with and
-    without the generator meet the same trials.
-    """
+    """`rg-fit` where a recipe fits a reference generator, else nothing. Also if θ_S_ref is the default posture:
+    commands are clamped to the same map, so that variants with and without the generator meet the same trials."""
     return ("rg-fit",) if recipe.task.references.use_rg or "rg-fit" in recipe.stages else ()
 
 

@@ -36,11 +36,8 @@ def train(
     look: Callable[[], None] | None = None,
 ) -> "Curves":
     """Train from the job's checkpoint, from its predecessor's end, or from scratch; returns the curves.
-
-    `checkpoint_every`: updates between two checkpoints; `note`: text of the progress, from an update's metrics; `look`:
-    called after each update. Raises Interrupted, after writing a checkpoint, once a stop is requested, and
-    StageFailed if the state is of another version.
-    """
+    `checkpoint_every`: in updates; `note`: text of an update's metrics; `look`: called after each update. Raises
+    Interrupted, with a checkpoint, once a stop is requested, and StageFailed if the state is of another version."""
     from safetensors.numpy import load_file
 
     from iowbc.learning.checkpoint import load_checkpoint, save_checkpoint

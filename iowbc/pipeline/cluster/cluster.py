@@ -52,9 +52,7 @@ class Cluster:
 
     def run(self, stage: Stage, job: Job) -> None:
         """Run a stage on a node as `stage.run(job)` would here; if it is lost, again from its last reported checkpoint.
-
-        Raises what the stage raises; RuntimeError with the node's traceback for an unexpected error.
-        """
+        Raises what the stage raises; RuntimeError with the node's traceback for an unexpected error."""
         for _ in range(TRIES):
             if (output := self._attempt(stage, job)) is not None:
                 return write_files(job.out, output)

@@ -31,10 +31,8 @@ STARTS = 4
 
 @contextmanager
 def connected(address: str, *, copy: bool) -> "Iterator[Cluster]":
-    """A connection to the end of the block; so long lives a local cluster, too. Raises `UsageError`.
-
-    address: `local`, `auto`, `host:port` or `ray://host:port`. copy: see `Cluster`.
-    """
+    """A connection, and a local cluster, to the end of the block. Raises `UsageError`. address: `local`, `auto`,
+    `host:port` or `ray://host:port`; copy: see `Cluster`."""
     for name, value in SETTINGS.items():
         os.environ.setdefault(name, value)
     if address == LOCAL:

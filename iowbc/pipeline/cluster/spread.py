@@ -28,11 +28,8 @@ def raised(error: Exception) -> BaseException | None:
 
 
 class ActorHost:
-    """Ray's actor on a node: one member, made at its first request.
-
-    A member is any object with `ask(message)`, which returns the answer, `state()`, its complete state, and
-    `restore(state)`, so that it can be remade elsewhere.
-    """
+    """Ray's actor on a node: one member, made at its first request. It is any object with `ask(message)`, which returns
+    the answer, `state()`, its complete state, and `restore(state)`, so that it can be remade elsewhere."""
 
     def __init__(self, make: Callable[[], Any]) -> None:
         self._make = make
@@ -98,11 +95,8 @@ class NodeActorPool:
             self._send(place)
 
     def answers(self) -> list[Any]:
-        """The members' answers, in order.
-
-        Raises `WorkerFailed` if a member raises, `StageFailed` if one is lost too often, and `Interrupted` if a stop is
-        requested while members have not started.
-        """
+        """The members' answers, in order. Raises `WorkerFailed` if a member raises, `StageFailed` if one is lost too
+        often, `Interrupted` if a stop is requested while members have not started."""
         while self._asked:
             over, late = ray.wait(list(self._asked), num_returns=len(self._asked), timeout=POLL)
             for reference in over:
@@ -166,10 +160,8 @@ class NodeSpread:
         self, function: Callable[..., Result], calls: Sequence[tuple[Any, ...]], folders: Mapping[str, Path]
     ) -> Iterator[tuple[int, Result]]:
         """Call a module-level function with each of these arguments on any node, one core each. Yields index and result
-        of each call in the order of completion. `folders`: input folders, passed by name as paths on the node.
-
-        Raises `Interrupted` once a stop is requested.
-        """
+        of each call as it ends. `folders`: passed by name as paths on the node. Raises `Interrupted` after a stop
+        request."""
         own = {name: self._folders[path] for name, path in folders.items()}
         piece = ray.remote(num_cpus=1, max_retries=TRIES, scheduling_strategy="SPREAD")(_called)
         waiting = {piece.remote(function, arguments, own): place for place, arguments in enumerate(calls)}

@@ -120,11 +120,8 @@ class Artifact:
 def seal(
     out: Path, results: Sequence[str], details: Mapping[str, Any], ingredients: Mapping[str, Any], recipe: str
 ) -> None:
-    """Turn a stage's output into an artifact: add key and recipe, sync all files, write the manifest last.
-
-    results: patterns of the files that later stages depend on; each must match a file. details: the fields of
-    `Manifest` that are not computed from the files.
-    """
+    """Turn a stage's output into an artifact: add key and recipe, sync all files, write the manifest last. results: as
+    in `Stage`; each must match a file. details: fields of `Manifest` that are not computed from the files."""
     files = {
         path.relative_to(out).as_posix(): _record(path)
         for path in sorted(out.rglob("*"))

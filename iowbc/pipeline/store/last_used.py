@@ -1,7 +1,4 @@
-"""Records of artifacts that each recipe used last (for `status`, `show`) and ever (kept by `gc`), and links.
-
-A link is named `runs/<recipe>/<stage>`; for a run with overrides, `runs/<recipe>/<stage>-<key>`.
-"""
+"""Records of artifacts that each recipe used last (for `status`, `show`) and ever (kept by `gc`), and links."""
 
 import os
 import shlex
@@ -145,6 +142,7 @@ def _link(runs: Runs, recipe: str, name: str, artifact: Path) -> None:
 
 
 def _with_key(stage: str, artifact: Path) -> str:
+    """Name of the link of a run with overrides; without, it is the stage's."""
     return f"{stage}-{artifact.name[:KEY_LENGTH]}"
 
 

@@ -56,10 +56,8 @@ def taken(file: IO[Any], operation: int = fcntl.LOCK_EX) -> bool:
 def key_lock(
     runs: Runs, key: str, on_wait: Callable[[Holder], None], interrupted: Callable[[], bool]
 ) -> Iterator[bool]:
-    """Hold a key's lock. If another process holds it, call `on_wait` with that holder, then wait.
-
-    Yields False, without the lock, if `interrupted` becomes true while waiting.
-    """
+    """Hold a key's lock. If another process holds it, call `on_wait` with that holder and wait; yields False, without
+    the lock, if `interrupted` becomes true meanwhile."""
     runs.locks.mkdir(parents=True, exist_ok=True)
     with lock_path(runs, key).open("a+") as file:
         reported = False

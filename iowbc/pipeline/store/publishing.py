@@ -24,11 +24,8 @@ LARGEST_REPOSITORY = 45_000_000
 
 
 def publish(runs: Runs, artifact: Artifact, without: Collection[str] = ()) -> Artifact:
-    """Copy an artifact to `runs/published/` and verify the copy; one process at a time.
-
-    Files of other kinds, large ones, and those named in `without` are left out and named in the copy's manifest. What a
-    process left that died here is brought back or removed.
-    """
+    """Copy an artifact to `runs/published/` and verify it; one process at a time. Files of other kinds, large ones and
+    those in `without` are left out and named in its manifest; what a dead process left is restored or removed."""
     with named_lock(lock_path(runs, PUBLISHING)):
         for leftover in runs.published.glob("*/.*"):
             if leftover.suffix == OLD:

@@ -60,10 +60,8 @@ class Workspace:
         self._begun = self._written = 0.0
 
     def begin(self, recipe: str, forced: bool, code: dict[str, str], command: str = "") -> Progress | None:
-        """Make room for an attempt; returns the record of the earlier one that it continues.
-
-        A forced attempt continues only one that was forced too. `command`: what goes on with it when it is stopped.
-        """
+        """Make room for an attempt; returns the record of the earlier one that it continues, for a forced attempt only
+        a forced one. `command`: resumes it when it is stopped."""
         earlier = read_record(Progress, self.root / PROGRESS)
         if forced and not (earlier and earlier.forced):
             shutil.rmtree(self.root, ignore_errors=True)

@@ -35,10 +35,8 @@ class Journal:
         self._file = path.open("ab", buffering=0)
 
     def acquire(self, patience: float = 0.0) -> bool:
-        """Take the journal for this process; False where another one keeps it longer than `patience` [s].
-
-        A last line that a dying process left half written is cut off.
-        """
+        """Take the journal for this process, without a half-written last line of a process that died; False where
+        another one keeps it longer than `patience` [s]."""
         limit = time.monotonic() + patience
         while not taken(self._file):
             if time.monotonic() >= limit:

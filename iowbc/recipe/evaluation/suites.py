@@ -200,10 +200,8 @@ class PushMap(Section):
 
 
 class Probe(Section):
-    """Linear regression of the object's mass on the policy's observations, in trials with evenly spread masses.
-
-    Trials alternate between training and test set, so that no tested mass was trained on.
-    """
+    """Linear regression of the object's mass on the policy's observations, in trials with evenly spread masses, of
+    which every other one is for the test: no tested mass was trained on."""
 
     scene: ObjectScene = "lift"
     """Scene of `simulation.scenes`, with an object."""

@@ -58,10 +58,8 @@ for _tag, _pattern, _first in IMPLICIT:
 
 
 def read_document(text: str, file: str) -> Located:
-    """The tree of one YAML document; the root's place is the file's first line.
-
-    Raises `RecipeError` for bad syntax, duplicate keys (all of them) and tags other than YAML's plain scalars.
-    """
+    """The tree of one YAML document; the root's place is the file's first line. Raises `RecipeError` for bad syntax,
+    duplicate keys (all of them) and tags other than YAML's plain scalars."""
     return _read(text, lambda mark: f"{file}:{mark.line + 1}:{mark.column + 1}", f"{file}:1:1")
 
 

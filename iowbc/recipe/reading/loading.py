@@ -59,10 +59,8 @@ def known_files(inside: Path = Path()) -> Iterator[Path]:
 
 
 def overridden(tree: Located, overrides: Sequence[str]) -> Located:
-    """Apply the overrides to the tree, in order.
-
-    A number in a path is an index of a list, which may be a default of the recipe. Raises `RecipeError`.
-    """
+    """Apply the overrides to the tree, in order. A number in a path is an index of a list, which may be a default of
+    the recipe. Raises `RecipeError`."""
     for override in overrides:
         place = f"--set {override}"
         dotted, equals, text = override.partition("=")
@@ -104,10 +102,8 @@ def _default(path: tuple[str, ...], place: str) -> Located:
 
 
 def with_files(tree: Located, folder: Path) -> Located:
-    """Embed the current content of all named files; paths are relative to the recipe file that contains them.
-
-    `folder`: base of paths given on the command line. Raises `RecipeError`.
-    """
+    """Embed the content of all named files; paths are relative to the recipe file that contains them, or on the command
+    line to `folder`. Raises `RecipeError`."""
     problems = []
 
     def taken_in(leaf: Located, path: tuple[str, ...] = ()) -> Located:

@@ -16,10 +16,8 @@ KEYS = ("name", "description", "variants")
 
 
 def load_study(word: str | Path, overrides: Sequence[str] = ()) -> tuple[LoadedRecipe, ...]:
-    """The variants of a study file, each with the overrides; empty for an ordinary recipe. Raises `RecipeError`.
-
-    Variants are named as on the command line, or by a path relative to the file.
-    """
+    """The variants of a study file, each with the overrides; empty for an ordinary recipe. They are named as on the
+    command line, or by a path relative to the file. Raises `RecipeError`."""
     file = recipe_file(word)
     tree = read_document(read_text(str(file), f"{file}:1:1"), str(file))
     if not isinstance(tree.value, dict) or "variants" not in tree.value:

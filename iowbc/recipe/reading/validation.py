@@ -22,10 +22,8 @@ SEVERAL = re.compile(r"[^,],[^,]|\d\.\.\d")
 
 
 def validate(tree: Located) -> Recipe:
-    """The recipe of a tree merged into the defaults. Sections may be partial, also those that are off by default.
-
-    Raises `RecipeError` with all problems.
-    """
+    """The recipe of a tree merged into the defaults; sections may be partial, also those that are off by default.
+    Raises `RecipeError` with all problems."""
     whole = merged(defaults(), _opened(tree, defaults()))
     try:
         recipe = Recipe.model_validate(plain(whole))
