@@ -116,7 +116,7 @@ class Runner:
                 step = self._decide(stage, whole)
 
         def waits(holder: object) -> None:
-            self._show(stage, "waits", f"{holder} is making it")
+            self._show(stage.name, "waits", f"{holder} is making it")
             self.display.say(f"{stage.name}: busy, held by {holder}; waiting for it, to use what it makes")
 
         with key_lock(self.store.runs, step.key, waits, self.interrupted) as held:
@@ -152,7 +152,7 @@ class Runner:
 
     def _reused(self, step: StagePlan) -> Artifact:
         assert step.artifact is not None
-        self._show(step.stage, "cached", "; ".join(("published", *step.notes) if step.published else step.notes))
+        self._show(step.stage.name, "cached", "; ".join(("published", *step.notes) if step.published else step.notes))
         if self.tracker is not None:
             self.tracker.finished(step.stage.name, step.artifact, cached=True)
         return step.artifact
@@ -172,7 +172,7 @@ class Runner:
         earlier = workspace.begin(self.loaded.recipe.name, forced, dict(step.code), self.command())
         describe(workspace.root, ingredients, resolved)
         view.record, view.began = workspace.state, time.monotonic() - workspace.seconds
-        self._show(stage, "runs", short(step.notes or step.reasons, 1))
+        self._show(stage.name, "runs", short(step.notes or step.reasons, 1))
         view.note = ""
         changed = changed_code(earlier.code, step.code) if earlier else []
         if changed:
@@ -231,22 +231,21 @@ class Runner:
             raise PipelineFailed(f"{stage.name} failed: {summary}\nthe traceback is also in {details_file}") from error
         self.made.append(stage.name)
         view.seconds = artifact.manifest.seconds
-        self._show(stage, "done")
+        self._show(stage.name, "done")
         if self.tracker is not None:
             self.tracker.finished(stage.name, artifact, cached=False)
         return artifact
 
-    def _show(self, stage: Stage, state: str, note: str = "") -> None:
-        view = self.views[stage.name]
+    def _show(self, stage: str, state: str, note: str = "") -> None:
+        view = self.views[stage]
         view.state, view.note = state, note
         self.display.changed(view)
 
     def _ended(self, workspace: Workspace, state: str, status: str, message: str) -> None:
         with contextlib.suppress(OSError):  # a full disk must not hide why the stage ended
             workspace.write()
-        view = self.views[workspace.stage]
-        view.seconds, view.state, view.note = workspace.seconds, state, ""
-        self.display.changed(view)
+        self.views[workspace.stage].seconds = workspace.seconds
+        self._show(workspace.stage, state)
         if self.tracker is not None:
             with contextlib.suppress(OSError):
-                self.tracker.end(view.name, status, message)
+                self.tracker.end(workspace.stage, status, message)

@@ -80,10 +80,8 @@ class Recipe(Section):
             text = f"{self.skill.frequency:g} Hz does not divide the control frequency"
             yield "skill.frequency", f"{text} of {self.task.control_frequency:g} Hz; {better}"
         if self.rg.height == "com" and self.task.references.height is not None:
-            text = (
-                "compares the pelvis with its commanded height, and rg.height: com commands that of the centre of mass"
-            )
-            yield "task.references.height", text
+            text = "compares the pelvis with its commanded height"
+            yield "task.references.height", f"{text}, and rg.height: com commands that of the centre of mass"
         if self.task.action.previous_share and self.eval.policy in ("model", "public"):
             yield "task.action.previous_share", f"eval.policy: {self.eval.policy} sets joint targets itself; take 0"
         yield from scene_name_problems(self)

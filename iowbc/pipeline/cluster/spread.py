@@ -111,8 +111,7 @@ class NodeActorPool:
         self._places = []
 
     def _start(self, place: Place) -> None:
-        options = {"scheduling_strategy": "SPREAD", "max_restarts": 0}
-        place.actor = self._host.options(**options).remote(place.make)
+        place.actor = self._host.options(scheduling_strategy="SPREAD", max_restarts=0).remote(place.make)
         place.made = False
 
     def _send(self, place: Place) -> None:

@@ -51,8 +51,7 @@ def syntax_digest(source: Path) -> str:
 
 def _is_text(statement: ast.AST) -> bool:
     """A bare string: a docstring, or the sentence under a field."""
-    return (
-        isinstance(statement, ast.Expr)
-        and isinstance(statement.value, ast.Constant)
-        and isinstance(statement.value.value, str)
-    )
+    match statement:
+        case ast.Expr(value=ast.Constant(value=str())):
+            return True
+    return False

@@ -45,15 +45,12 @@ class Store:
         return None
 
     def artifacts(self, stage: str | None = None) -> list[Artifact]:
-        """All readable artifacts, of one stage or all, oldest first; local ones replace published ones of the same
-        key."""
-        found: dict[str, Artifact] = {}
-        for root in (self.runs.store, self.runs.published):
-            for folder in root.glob(f"{stage or '*'}/*"):
-                artifact = self.find_any(folder.parent.name, folder.name)
-                if artifact is not None:
-                    found[artifact.manifest.key] = artifact
-        return sorted(found.values(), key=lambda artifact: artifact.manifest.made)
+        """All readable artifacts, of one stage or all, oldest first; local ones replace published ones of their key."""
+        roots = (self.runs.store, self.runs.published)
+        folders = [folder for root in roots for folder in root.glob(f"{stage or '*'}/*")]
+        keys = dict.fromkeys((folder.parent.name, folder.name) for folder in folders)
+        found = filter(None, (self.find_any(*key) for key in keys))
+        return sorted(found, key=lambda artifact: artifact.manifest.made)
 
     def published(self, stage: str) -> list[Artifact]:
         """The readable published artifacts of a stage, oldest first."""

@@ -4,6 +4,7 @@ import functools
 import re
 import types
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from typing import Annotated, Any, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
@@ -67,10 +68,8 @@ def _opened(tree: Located, base: Located, path: tuple[str, ...] = ()) -> Located
 def _of_its_own(path: Sequence[str]) -> Located:
     """Defaults of the section at a path, if all its keys have one."""
     for model in models_at(path):
-        try:
+        with suppress(ValidationError):
             return located(model().model_dump(mode="json"), "default")
-        except ValidationError:
-            continue
     return Located(None, "default")
 
 
