@@ -174,7 +174,7 @@ class Encoder(Section):
 
 @functools.cache
 def sentences(section: type[BaseModel]) -> dict[str, str]:
-    """Attribute docstrings of a section and its bases, by field name; of a subsection without one, its own docstring.
+    """Attribute docstrings of a section and its bases, by field name; of a subsection without one, its own first part.
     They are read on demand: pydantic's `use_attribute_docstrings` reads all sources whenever a command starts."""
     bases = [base for base in section.__bases__ if issubclass(base, BaseModel) and base is not BaseModel]
     (definition,) = ast.parse(textwrap.dedent(inspect.getsource(section))).body
@@ -187,7 +187,7 @@ def sentences(section: type[BaseModel]) -> dict[str, str]:
     for name, field in section.model_fields.items():
         kind = field.annotation
         if name not in found and isinstance(kind, type) and issubclass(kind, Section):
-            found[name] = inspect.cleandoc(kind.__doc__ or "")
+            found[name] = inspect.cleandoc(kind.__doc__ or "").split("\n\n")[0]
     return found
 
 

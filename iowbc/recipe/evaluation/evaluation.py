@@ -135,7 +135,6 @@ class Evaluation(Section):
     """The acting policy: the deployable student, the teacher with its privileged observation, the model-based
     controller of `model` (no training), or the third-party controller of `public`."""
     model: ModelBased = Field(default=ModelBased(), json_schema_extra=LATER)
-    """The model-based baseline: tasks and limits of its quadratic program."""
     public: PublicController | None = Field(default=None, json_schema_extra=LATER)
     """A third-party controller, for the policy `public`."""
     label: str = Field(default="IO-WBC", min_length=1, max_length=200, json_schema_extra=COSMETIC)
@@ -187,7 +186,6 @@ class Evaluation(Section):
     """Physics engine of the trials. Drake, an optional extra, runs the same trials of a policy trained in MuJoCo."""
     drake: Drake = Field(default=Drake(), json_schema_extra=LATER)
     success: Success = Success()
-    """Criteria of survival and success."""
     video: Video = Field(default=Video(), json_schema_extra=COSMETIC)
 
     def problems(self) -> Problems:

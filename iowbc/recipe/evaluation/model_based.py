@@ -39,7 +39,7 @@ class Estimation(Section):
 
 
 class ModelBased(Section):
-    """A whole-body quadratic program that stands, crouches and leans on both feet; it does not walk.
+    """The model-based baseline: a quadratic program that stands, crouches and leans on both feet; it does not walk.
 
     Its model is the nominal robot without a load. It sees the same observation as the student and acts through the same
     joint controllers.

@@ -178,7 +178,6 @@ class Reward(Section):
     smooth: Smoothness = Smoothness()
     gait: GaitConstraint = GaitConstraint()
     yielding: Yielding = Field(default=Yielding(), json_schema_extra=LATER)
-    """Compliance of hands and velocity."""
     without: tuple[Literal["sync", "object", "smooth", "gait"], ...] = Field(default=(), json_schema_extra=LATER)
     """Groups of terms to disable, for ablations of r_sync, r_obj, r_smooth, r_gait."""
     alive: float = 0.5

@@ -112,4 +112,3 @@ class Task(Section):
     reward: Reward = Reward()
     termination: Termination = Termination()
     curriculum: Curriculum = Curriculum()
-    """The three phases of training."""
