@@ -18,11 +18,11 @@ from iowbc.recipe.task.task import Task
 from iowbc.robot.description import Robot
 
 
-def _port(name: str, shape: tuple[int, ...], unit: str, frame: str, meaning: str) -> PortEntry:
+def port_entry(name: str, shape: tuple[int, ...], unit: str, frame: str, meaning: str) -> PortEntry:
     return PortEntry(name=name, shape=shape, unit=unit, frame=frame, meaning=meaning)
 
 
-GRASP = _port("grasp", (2, 3), "m", "heading", "base grasp of both wrists")
+GRASP = port_entry("grasp", (2, 3), "m", "heading", "base grasp of both wrists")
 
 
 class Program(nn.Module):
@@ -58,9 +58,9 @@ class StepProgram(Program):
         super().__init__()
         self.equations, self.student, self.inputs = equations, student, inputs
         self.outputs = (
-            _port("target", (joints,), "rad", "joint", "targets of the PD loop, all joints"),
-            _port("action", (support,), "action", "joint", "residual action, clipped"),
-            _port("support_reference", (support,), "rad", "joint", "θ_S_ref with the gait prior"),
+            port_entry("target", (joints,), "rad", "joint", "targets of the PD loop, all joints"),
+            port_entry("action", (support,), "action", "joint", "residual action, clipped"),
+            port_entry("support_reference", (support,), "rad", "joint", "θ_S_ref with the gait prior"),
             inputs[-1].model_copy(update={"name": "state_next", "meaning": "the next step's `state`"}),
         )
         self.eval().requires_grad_(False)
@@ -87,24 +87,20 @@ class ControllerGraph:
     ) -> None:
         equations = ControlStep(robot, task, references, layout, history, student)
         self.robot, self.student, self.layout, self.history, self.equations = robot, student, layout, history, equations
-        self.state = tuple(_port(name, equations.shapes[name], *about) for name, about in STATE.items())
+        self.state = tuple(port_entry(name, equations.shapes[name], *about) for name, about in STATE.items())
         """Parts of the packed state, in order."""
         seen = {**quantities(of_object=False)}
         if OBJECT[0].name in layout.names:
             seen |= quantities(of_object=True)
         measured = {
-            name: _port(name, (len(what.kind(robot)),), what.unit, what.frame, what.meaning)
+            name: port_entry(name, (len(what.kind(robot)),), what.unit, what.frame, what.meaning)
             for name, what in seen.items()
         }
         meaning = "the wanted command C: rate-limited and clamped inside"
-        command = _port("command", (len(COMMAND),), PROPRIOCEPTION[0].unit, "heading", meaning)
-        state = _port("state", (sum(equations.sizes.values()),), "SI", "-", "what the loop remembers")
-        load = _port("load", (1,), "kg", "-", "mass expected between the hands")
-        traced = equations.converted(_tensor)
+        command = port_entry("command", (len(COMMAND),), PROPRIOCEPTION[0].unit, "heading", meaning)
+        state = port_entry("state", (sum(equations.sizes.values()),), "SI", "-", "what the loop remembers")
+        load = port_entry("load", (1,), "kg", "-", "mass expected between the hands")
+        traced = equations.converted(lambda values: torch.from_numpy(np.ascontiguousarray(values, np.float32)))
         self.settle = SettleProgram(traced, command, measured["heading"], state)
         inputs = (command, *measured.values(), GRASP, load, state)
         self.step = StepProgram(traced, student, inputs, len(robot.joints), len(robot.support))
-
-
-def _tensor(values: np.ndarray) -> Tensor:
-    return torch.from_numpy(np.ascontiguousarray(values, np.float32))

@@ -9,12 +9,12 @@ from torch import Tensor
 
 from iowbc.arrays import Array
 from iowbc.control.command import COMMAND
-from iowbc.deploy.contract import PortEntry, write_sealed
+from iowbc.deploy.contract import write_sealed
 from iowbc.deploy.controller import open_session, run
 from iowbc.deploy.skill import CONTRACT, FILES, GOLDEN, GRAPH, SkillContract
 from iowbc.export.folder import PACKAGES
 from iowbc.export.golden import largest_difference, write_golden
-from iowbc.export.graph import Program
+from iowbc.export.graph import Program, port_entry
 from iowbc.export.onnx_graph import run_torch, write_onnx
 from iowbc.learning.networks import TeacherNetwork
 from iowbc.recipe.recipe import Recipe
@@ -26,10 +26,9 @@ class SkillProgram(Program):
     def __init__(self, network: TeacherNetwork) -> None:
         super().__init__()
         self.network, size = network, len(network.normalizer.mean)
-        meaning = "see iowbc.control.skill_observation"
-        self.inputs = (PortEntry(name="observation", shape=(size,), unit="SI", frame="heading", meaning=meaning),)
+        self.inputs = (port_entry("observation", (size,), "SI", "heading", "see iowbc.control.skill_observation"),)
         meaning = "departure of C from the nominal command, in parts of its scales"
-        self.outputs = (PortEntry(name="action", shape=(len(COMMAND),), unit="1", frame="heading", meaning=meaning),)
+        self.outputs = (port_entry("action", (len(COMMAND),), "1", "heading", meaning),)
         self.eval().requires_grad_(False)
 
     def forward(self, *values: Tensor) -> tuple[Tensor, ...]:
@@ -40,9 +39,7 @@ def write_skill(
     out: Path, network: TeacherNetwork, recipe: Recipe, sources: Mapping[str, str], observations: Array
 ) -> float:
     """Write the skill; returns the largest difference between torch and onnxruntime over the observations (n, size).
-
-    sources: artifact keys of the skill's inputs, by stage.
-    """
+    sources: artifact keys of the skill's inputs, by stage."""
     contract = SkillContract(
         frequency=recipe.skill.frequency,
         observation=observations.shape[1],
