@@ -45,31 +45,29 @@ class Plausibility:
     """Checks the measurements and commands of n robots; its only state is the age of the measurements."""
 
     def __init__(self, contract: Contract, limits: Limits, robots: int) -> None:
-        speed = limits.joint_speed * np.array(contract.velocity_limit)
-        ranges: dict[str, tuple[Array | float, Array | float]] = {
-            "command": (-limits.command, limits.command),
-            "projected_gravity": (-limits.norm[1], limits.norm[1]),
-            "base_angular_velocity": (-limits.turning, limits.turning),
-            "heading": (-limits.heading, limits.heading),
-            "joint_position": (
-                np.array(contract.lower) - limits.joint_margin,
-                np.array(contract.upper) + limits.joint_margin,
-            ),
-            "joint_velocity": (-speed, speed),
-            "object_position": (-limits.distance, limits.distance),
-            "object_quaternion": (-limits.norm[1], limits.norm[1]),
-            "object_linear_velocity": (-limits.speed, limits.speed),
-            "object_angular_velocity": (-limits.turning, limits.turning),
+        high: dict[str, Array | float] = {
+            "command": limits.command,
+            "projected_gravity": limits.norm[1],
+            "base_angular_velocity": limits.turning,
+            "heading": limits.heading,
+            "joint_position": np.array(contract.upper) + limits.joint_margin,
+            "joint_velocity": limits.joint_speed * np.array(contract.velocity_limit),
+            "object_position": limits.distance,
+            "object_quaternion": limits.norm[1],
+            "object_linear_velocity": limits.speed,
+            "object_angular_velocity": limits.turning,
         }
+        low = {name: -bound for name, bound in high.items()}
+        low["joint_position"] = np.array(contract.lower) - limits.joint_margin
         sizes = {port.name: port.shape[0] for port in contract.inputs}
         entries = {"command": COMMAND, "joint_position": contract.joints, "joint_velocity": contract.joints}
         self.names = ("command", *(field.name for field in fields(Measured) if field.name in sizes))
         """Names of the checked values, in order."""
         self._unit_length = [name for name in UNIT_LENGTH if name in sizes]
-        low, high = ([np.broadcast_to(ranges[name][end], sizes[name]) for name in self.names] for end in (0, 1))
+        norms = len(self._unit_length)
         self._low, self._high = (
-            np.concatenate([*rows, np.full(len(self._unit_length), norm)])
-            for rows, norm in zip((low, high), limits.norm, strict=True)
+            np.concatenate([*(np.full(sizes[name], bounds[name]) for name in self.names), np.full(norms, norm)])
+            for bounds, norm in zip((low, high), limits.norm, strict=True)
         )
         self._columns = [
             f"{name}[{entry}]" for name in self.names for entry in entries.get(name, map(str, range(sizes[name])))
@@ -79,11 +77,9 @@ class Plausibility:
         self._repeated: Array = np.zeros(robots, np.int64)
 
     def refusals(self, given: dict[str, Array], measured_at: Array | None) -> dict[int, str]:
-        """Reason by robot, for robots with implausible or old values.
-
-        given: the values of `names`, (n, size) each. measured_at: time stamps of the measurements, (n,) [s], of any
-        clock; without them equal values are one measurement, as sensors have noise.
-        """
+        """Reason by robot, for robots with implausible or old values. given: the values of `names`, (n, size) each.
+        measured_at: time stamps of the measurements, (n,) [s], of any clock; without them equal values are one
+        measurement, as sensors have noise."""
         values = [given[name] for name in self.names]
         rows = np.column_stack([*values, *(np.sqrt(np.vecdot(given[n], given[n])) for n in self._unit_length)])
         inside = (rows >= self._low) & (rows <= self._high)
