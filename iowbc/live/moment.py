@@ -61,7 +61,7 @@ class SimulationRecorder:
 
     def look(self, seconds: float) -> Moment:
         data = self._appearance.update()
-        bodies = _poses(data)
+        bodies = np.hstack([data.xpos, data.xquat])
         return Moment(
             seconds=seconds,
             bodies=bodies,
@@ -111,11 +111,7 @@ class MomentRecorder(SimulationRecorder):
         mujoco.mj_kinematics(self.model, reference)
         return replace(
             moment,
-            reference=_poses(reference),
+            reference=np.hstack([reference.xpos, reference.xquat]),
             command=np.array(self.batch.memory.command[0]).reshape(len(COMMAND)),
             signals={name: values[0].copy() for name, values in self._signals.items()},
         )
-
-
-def _poses(data: Any) -> Array:
-    return np.concatenate([data.xpos, data.xquat], axis=1)
