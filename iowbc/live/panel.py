@@ -30,13 +30,8 @@ LIGHTEST = 1.0
 STRONGEST_PUSH = 60.0
 """Largest push on the slider [N·s]: what speeds a robot of 35 kg up by 1.7 m/s."""
 LAST_SEED = 2**32 - 1
-LABELS = {
-    "v_x": "forward [m/s]",
-    "v_y": "left [m/s]",
-    "yaw_rate": "turn left [rad/s]",
-    "height": "height [m]",
-    "pitch": "lean [rad]",
-}
+LABELS = ("forward [m/s]", "left [m/s]", "turn left [rad/s]", "height [m]", "lean [rad]")
+"""Sliders of the command's first entries, in its order."""
 UNITS = {"E_v": "m/s", "E_psi": "rad", "E_alpha": "rad", "E_h": "m"}
 SYMBOLS = {"E_v": "E<sub>v</sub>", "E_psi": "E<sub>ψ</sub>", "E_alpha": "E<sub>α</sub>", "E_h": "E<sub>h</sub>"}
 CELL = "padding:0 0.6em 0 0;text-align:right"
@@ -171,8 +166,8 @@ class DrivingPanel(ControlPanel):
         pitch = min(commands.pitch[0], commands.deep_pitch[0]), max(commands.pitch[1], commands.deep_pitch[1])
         ranges = [commands.velocity_x, commands.velocity_y, commands.yaw_rate, commands.height, pitch]
         rows: list[viser.GuiSliderHandle] = []
-        for name, (low, high), start in zip(COMMAND[:5], ranges, nominal_command(commands)[:5], strict=True):
-            rows.append(self._gui.add_slider(LABELS[name], low, high, 0.01, float(np.clip(start, low, high))))
+        for label, (low, high), start in zip(LABELS, ranges, nominal_command(commands)[:5], strict=True):
+            rows.append(self._gui.add_slider(label, low, high, 0.01, float(np.clip(start, low, high))))
         with self._gui.add_folder("Wrists", expand_by_default=False):
             for name, reach in zip(COMMAND[5:], np.tile(wrist, 2).tolist(), strict=True):
                 rows.append(self._gui.add_slider(f"{name.replace('_', ' ')} [m]", -reach, reach, 0.005, 0.0))
