@@ -93,11 +93,8 @@ class Adapter:
 
 
 def validate_adapter(adapter: Adapter, robot: Robot, frequency: float, *, moves_arms: bool = False) -> None:
-    """Check an adapter against a robot and a control rate [Hz], and its network against its observation.
-    `moves_arms`: the controller acts on all arm joints, too.
-
-    Raises StageFailed with the field, its value and the valid values.
-    """
+    """Check an adapter against a robot and a control rate [Hz], and its network against its observation. `moves_arms`:
+    the controller acts on all arm joints, too. Raises StageFailed with the field, its value and the valid values."""
     problems = _joint_name_problems(adapter, robot, moves_arms)
     for name in ("default", "kp", "kd", "scale"):
         values, expected = getattr(adapter, name), (len(adapter.acted if name == "scale" else adapter.joints),)
@@ -108,8 +105,7 @@ def validate_adapter(adapter: Adapter, robot: Robot, frequency: float, *, moves_
         problems.append(f"{text}; set task.control_frequency to it")
     if adapter.history < 1:
         problems.append(f"history: is {adapter.history}, expected at least the present observation")
-    unknown = sorted(set(adapter.ranges or ()) - set(VELOCITIES))
-    if unknown:
+    if unknown := sorted(set(adapter.ranges or ()) - set(VELOCITIES)):
         problems.append(f"ranges: {', '.join(unknown)}: no such velocity; valid: {', '.join(VELOCITIES)}")
     if problems:
         raise StageFailed(f"{PLACE}: does not fit the robot {robot.name}: {'; '.join(problems)}")

@@ -36,8 +36,7 @@ LARGEST_ACTION = 100.0
 def adapter(policy: Path) -> Adapter:
     """The adapter of an ONNX file of the package. Raises StageFailed if metadata entries are missing."""
     said, run = metadata(policy), network(policy)
-    missing = [name for name in ("dof_names", "kp", "kd", "command_ranges") if name not in said]
-    if missing:
+    if missing := [name for name in ("dof_names", "kp", "kd", "command_ranges") if name not in said]:
         raise StageFailed(f"{policy}: its metadata lacks {', '.join(missing)}, which walkers of holosoma have")
     joints = tuple(said["dof_names"])
     default = [DEFAULT.get(name.removesuffix("_joint"), DEFAULT.get(kind_of(name), 0.0)) for name in joints]

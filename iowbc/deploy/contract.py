@@ -147,8 +147,7 @@ class Contract(Section):
                 raise ValueError(f"{name}: {len(values)} numbers {values} for {joints} joints")
         if sorted((*self.support, *self.interaction)) != list(range(joints)):
             raise ValueError(f"support {self.support} and interaction {self.interaction} do not cover {joints} joints")
-        outside = [name for name in self.files if ".." in Path(name).parts or Path(name).is_absolute()]
-        if outside:
+        if outside := [name for name in self.files if ".." in Path(name).parts or Path(name).is_absolute()]:
             raise ValueError(f"files: {', '.join(outside)} lie outside of the folder")
         if len(self.action_scale) != len(self.support):
             raise ValueError(f"action_scale: {len(self.action_scale)} numbers for {len(self.support)} support joints")
@@ -259,8 +258,7 @@ def parsed(kind: type[Kind], path: Path, made_by: str) -> Kind:
 
 def require_unchanged(files: Mapping[str, str], folder: Path) -> None:
     """Raises ContractBroken for missing or changed files. `files`: digests by path in the folder."""
-    missing = [name for name in files if not (folder / name).is_file()]
-    if missing:
+    if missing := [name for name in files if not (folder / name).is_file()]:
         raise ContractBroken(f"{folder}: {', '.join(missing)} missing; give the whole folder that was exported")
     for name, said in files.items():
         if (found := file_digest(folder / name)) != said:

@@ -80,10 +80,8 @@ class Robot:
 
 
 def robot_folder(name: str) -> Path:
-    """Finds `robots/<name>`: in the current folder, else in the checkout, else in the installed package.
-
-    A name with a slash is the path of a folder. Raises `UsageError` with the known robots.
-    """
+    """Finds `robots/<name>`: in the current folder, else in the checkout, else in the installed package. A name with a
+    slash is the path of a folder. Raises `UsageError` with the known robots."""
     if Path(name).name != name and (Path(name) / DESCRIPTION).is_file():
         return Path(name)
     found = robot_folders()
@@ -108,10 +106,8 @@ def _roots() -> list[Path]:
 
 
 def load_robot(folder: Path) -> Robot:
-    """Reads `robot.yaml` and the MJCF beside it that it names.
-
-    Raises OSError for a file that is not there, ValueError with the file, the entry, and what would be valid.
-    """
+    """Reads `robot.yaml` and the MJCF beside it that it names. Raises OSError for a file that is not there, ValueError
+    with the file, the entry, and what would be valid."""
     source = folder / DESCRIPTION
     text = small_text(source)
     try:
@@ -125,11 +121,9 @@ def load_robot(folder: Path) -> Robot:
 def _described(folder: Path, entries: Any) -> Robot:
     if not isinstance(entries, Mapping):
         raise ValueError(f"expected a mapping of entries, found {type(entries).__name__}")
-    missing = [key for key in NEEDED if key not in entries]
-    if missing:
+    if missing := [key for key in NEEDED if key not in entries]:
         raise ValueError(f"missing {', '.join(missing)}")
-    unknown = [str(key) for key in entries if key not in (*NEEDED, "linkages")]
-    if unknown:
+    if unknown := [str(key) for key in entries if key not in (*NEEDED, "linkages")]:
         raise ValueError(f"unknown entry {', '.join(unknown)}; valid: {', '.join(NEEDED)}, linkages")
     mjcf = folder / entries["mjcf"]
     if mjcf.name != entries["mjcf"]:
@@ -145,8 +139,7 @@ def _described(folder: Path, entries: Any) -> Robot:
     if any(len(pair) != 2 for pair in pairs):
         raise ValueError(f"linkages: expected pairs of joints, found {pairs}")
     rows = [_row(entries["joints"], name) for name in joints]
-    unused = set(entries["joints"]) - {kind_of(name) for name in joints}
-    if unused:
+    if unused := set(entries["joints"]) - {kind_of(name) for name in joints}:
         raise ValueError(f"joints: no joint of {mjcf.name} is of kind {', '.join(sorted(unused))}")
     default = np.array([side_sign(row, name) * float(row["default"]) for row, name in zip(rows, joints, strict=True)])
     lower = np.array([hinge.lower for hinge in hinges])
@@ -162,14 +155,14 @@ def _described(folder: Path, entries: Any) -> Robot:
     waist = tree.hinges_between(entries["torso"], entries["base"])
     legs = _sides("soles", [tree.hinges_between(body.name, entries["base"]) for body in sole_bodies])
     arms = _sides("wrists", [tree.hinges_between(body.name, entries["torso"]) for body, _ in grips])
-    others = [name for index, name in enumerate(joints) if index not in support]
+    interaction = np.setdiff1d(np.arange(len(joints)), support)
+    others = [joints[index] for index in interaction]
     if others != arms or not set(legs) <= {joints[index] for index in support}:
         text = f"legs and waist belong to it, and no joint of the arms {', '.join(arms)}"
         raise ValueError(
             f"support: {text}; outside of it are {', '.join(others)}, expected the left, then the right arm"
         )
-    few = [body.name for body in sole_bodies if len(body.feet) < 3 or len(body.feet) != len(sole_bodies[0].feet)]
-    if few:
+    if few := [body.name for body in sole_bodies if len(body.feet) < 3 or len(body.feet) != len(sole_bodies[0].feet)]:
         raise ValueError(f"soles: {few[0]} needs a geom of class foot at each corner, the same number on both sides")
     posture = dict(zip(joints, default.tolist(), strict=True))
     return Robot(
@@ -179,7 +172,7 @@ def _described(folder: Path, entries: Any) -> Robot:
         tree=tree,
         joints=joints,
         support=support,
-        interaction=np.array([index for index in range(len(joints)) if index not in set(support.tolist())]),
+        interaction=interaction,
         waist=_places(waist, support, joints),
         waist_pitch=_places([hinge for hinge in waist if _is_pitch(hinge)], support, joints),
         lateral=np.flatnonzero([not _is_pitch(hinges[index]) for index in support]),
@@ -249,8 +242,7 @@ def _is_pitch(hinge: Hinge) -> bool:
 
 def _places(hinges: Sequence[Hinge], support: Indices, joints: tuple[str, ...]) -> Indices:
     names = [joints[index] for index in support]
-    missing = [hinge.name for hinge in hinges if hinge.name not in names]
-    if missing:
+    if missing := [hinge.name for hinge in hinges if hinge.name not in names]:
         raise ValueError(f"support: joints of legs and waist belong to it, missing {', '.join(missing)}")
     return np.array([names.index(hinge.name) for hinge in hinges], dtype=np.int64)
 
