@@ -26,10 +26,8 @@ CONTRACT = "it takes the controller's pathlib.Path and returns an iowbc.adapters
 
 
 def load_adapter(controller: PublicController) -> Adapter:
-    """The adapter of a public controller, after a check of its file's digest.
-
-    Raises StageFailed if the file or its package is missing, the digest differs, or no adapter can be made.
-    """
+    """The adapter of a public controller. Raises StageFailed if its file or package is missing, the file's digest
+    differs, or no adapter can be made."""
     policy = policy_path(controller.policy)
     found = policy_digest(policy)
     if found != controller.sha256:
@@ -58,11 +56,9 @@ def adapted_robot(controller: PublicController, robot: Robot, task: Task) -> Pat
 
 
 def robot_of(adapter: Adapter, robot: Robot, *, moves_arms: bool = False) -> Path:
-    """Folder with the robot's description in which legs and waist have the controller's gains and default posture.
-
-    Arms take the controller's gains only if it moves them. The folder is deleted when the process exits. Raises
-    StageFailed if left and right differ, since they share one row of the description.
-    """
+    """Folder, until the process exits, with the robot's description in which legs and waist have the controller's gains
+    and default posture, and arms its gains only if it moves them. Raises StageFailed if left and right differ, since
+    they share one row of the description."""
     entries = yaml.safe_load((robot.folder / DESCRIPTION).read_text(encoding="utf-8"))
     rows = entries["joints"]
     for index in [*robot.support, *(robot.interaction if moves_arms else ())]:
@@ -90,9 +86,7 @@ def _folder(source: Path, description: str) -> Path:
 
 def policy_path(named: str) -> Path:
     """The file or folder of a controller: a path, or PACKAGE:PATH of an installed package, which is not imported.
-
-    Raises StageFailed.
-    """
+    Raises StageFailed."""
     package, colon, inside = named.partition(":")
     path = Path(named)
     if colon:

@@ -74,10 +74,7 @@ def record(setup: Setup, first: int, last: int, periods: int) -> RecordedSteps:
 @contextmanager
 def bare_loops(setup: Setup, groups: list[tuple[int, int]], periods: int) -> Iterator[Callable[[], float]]:
     """The bare loop in several processes, each with its share of the environments: a function that measures their total
-    rate, limited by the slowest process [environment steps/s].
-
-    Raises BrokenProcessPool if a process cannot record its steps.
-    """
+    rate, limited by the slowest [environment steps/s]. Raises BrokenProcessPool if one cannot record its steps."""
     context = get_context("spawn")
     with ExitStack() as stack:
         loops = [

@@ -41,10 +41,8 @@ class _BatchWrapper:
 
 
 def step_breakdown(setup: Setup, periods: int, rounds: int) -> dict[str, float]:
-    """CPU time of each part of a step of `setup.count` environments [ms]: medians over rounds from a reset.
-
-    Also `reset`: additional time at the end of an episode.
-    """
+    """CPU time of each part of a step of `setup.count` environments, and additional time at the end of an episode,
+    `reset` [ms]: medians over rounds from a reset."""
     workers = InProcess(setup)
     batch, spent = workers.batch, dict.fromkeys(("step", *PARTS[:-1]), 0.0)
     _watch(spent, batch, "step", "step")

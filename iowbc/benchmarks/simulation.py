@@ -49,10 +49,8 @@ def main(
 
 
 def _against_bare(setup: Setup, count: int, turns: int, resets: float) -> dict[str, float]:
-    """Rates of the bare loop and of the vector environment, alternately, with `count` processes.
-
-    `resets`: time in which all environments of a worker begin an episode, one after another [ms].
-    """
+    """Rates of the bare loop and of the vector environment, alternately, with `count` processes. `resets`: time in
+    which all environments of a worker begin an episode, one after another [ms]."""
     env = VectorEnv(setup.specification, num_envs=setup.count, workers=count, seed=setup.seed)
     try:
         with bare_loops(setup, env.workers.groups, PERIODS) as bare_rate:

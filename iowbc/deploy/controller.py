@@ -103,11 +103,9 @@ class Controller:
 
     @classmethod
     def load(cls, folder: Path | str, robots: int = 1, limits: Limits = WIDE) -> Self:
-        """The controller in a folder, or the export of the recipe with that name (see `exported_folder`).
-
-        `limits`: plausible measurements. Raises ContractBroken if the folder does not match its contract, ValueError
-        for fewer than one robot.
-        """
+        """The controller in a folder, or the export of the recipe with that name (see `exported_folder`). `limits`:
+        plausible measurements. Raises ContractBroken if the folder does not match its contract, ValueError for fewer
+        than one robot."""
         if robots < 1:
             raise ValueError(f"robots: {robots}, expected 1 or more")
         folder = exported_folder(folder)

@@ -15,10 +15,8 @@ also set torques: the largest factor in 96 trials was 1.3, and 1 was exceeded th
 
 
 class TargetGuard:
-    """Holds the last good targets of robots whose new ones are not finite or jump.
-
-    The allowed jump grows while targets are held, so that no robot is held forever.
-    """
+    """Holds the last good targets of robots whose new ones are not finite or jump. The allowed jump grows while targets
+    are held, so that no robot is held forever."""
 
     def __init__(self, robots: int, velocity_limit: Array, period: float) -> None:
         """`velocity_limit` (joints,) [rad/s]; `period`: control period [s]."""

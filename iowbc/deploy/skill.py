@@ -122,11 +122,9 @@ class Skill:
         self._command = self._rule.standing()
 
     def step(self, measured: Measured) -> Array:
-        """Commands C, (n, 11), for the next control period; a decision takes effect one period later, as in training.
-
-        A robot with an implausible measurement is taken to be where the controller last saw it; a decision that is not
-        finite keeps the command. Raises ValueError for a missing quantity.
-        """
+        """Commands C, (n, 11), for the next control period; a decision takes effect one period later, as in training. A
+        robot with an implausible measurement is taken to be where the controller last saw it; a decision that is not
+        finite keeps the command. Raises ValueError for a missing quantity."""
         measured = self._plausible(measured)
         if self._yaw is not None:
             action = run(self._session, {"observation": self.observation})["action"]

@@ -19,12 +19,9 @@ INPUT = "input/"
 
 
 def step_seconds(folder: Path | str, steps: int, skill: Path | None = None) -> Array:
-    """Wall time and CPU time of control steps along the repeated golden rollout, (steps, 2) [s]; other programs do not
-    lengthen CPU time. Without the first step of each rollout, which also settles the references.
-
-    folder: as in `Controller.load`; `skill`: folder of a skill whose commands replace the rollout's. Raises
-    ContractBroken if one does not match its contract.
-    """
+    """Wall time and CPU time of control steps along the repeated golden rollout, (steps, 2) [s], without the first step
+    of each, which also settles the references. folder: as in `Controller.load`; `skill`: folder of a skill whose
+    commands replace the rollout's. Raises ContractBroken if one does not match its contract."""
     controller = Controller.load(folder)
     commanding = None if skill is None else Skill.load(skill, controller)
     path = exported_folder(folder) / GOLDEN

@@ -24,10 +24,8 @@ ROBOT_FIELDS = ("support", "interaction", "kp", "kd", "effort", "velocity_limit"
 def write_folder(
     out: Path, graph: ControllerGraph, recipe: Recipe, rg: Path | None, sources: Mapping[str, str]
 ) -> contract.Contract:
-    """Write both graphs, `contract.json`, `recipe.json`, the robot's folder, and with `rg` the generator's folder.
-
-    sources: artifact keys of the inputs of the graph, by stage.
-    """
+    """Write both graphs, `contract.json`, `recipe.json`, the robot's folder, and with `rg` the generator's folder;
+    sources: artifact keys of the inputs of the graph, by stage."""
     robot, drawn = graph.robot, recipe.simulation.randomization
     arrays: dict[str, Any] = {name: tuple(getattr(robot, name).tolist()) for name in ROBOT_FIELDS}
     (out / exported_folder.ROBOT).mkdir()

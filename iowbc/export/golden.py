@@ -19,10 +19,8 @@ def stacked(steps: Sequence[Mapping[str, NDArray[np.float32]]]) -> Values:
 
 
 def played(settle: Callable[[Values], Values], step: Callable[[Values], Values], inputs: Values) -> Values:
-    """Outputs of the control step over a rollout of one robot, steps along the leading axis, without the state.
-
-    settle and step: map inputs to outputs by name; `inputs`: of every step, without the state, which is fed back.
-    """
+    """Outputs of the control step over a rollout of one robot, steps along the leading axis; settle and step: map
+    inputs to outputs by name; `inputs`: of every step. Without the state, which is fed back."""
     state: Values = {}
     found = []
     for row in range(len(inputs["command"])):

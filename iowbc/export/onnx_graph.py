@@ -12,11 +12,9 @@ from iowbc.export.graph import Program
 
 
 def write_onnx(program: Program, path: Path, opset: int, about: Mapping[str, str]) -> None:
-    """Write the module with named inputs and outputs and any number of robots as leading axis.
-
-    about: texts for the file's metadata. Source locations that the exporter writes are removed. The exporter is the
-    tracing one: the other takes two minutes for the iterations of `settle`.
-    """
+    """Write the module with named inputs and outputs and any number of robots as leading axis; about: texts for the
+    file's metadata. Source locations are removed. The exporter is the tracing one: the other takes two minutes for the
+    iterations of `settle`."""
     ports, names = program.inputs, [port.name for port in program.inputs]
     outputs = [port.name for port in program.outputs]
     with warnings.catch_warnings():

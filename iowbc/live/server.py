@@ -120,9 +120,7 @@ class LocalServer(viser.ViserServer):  # type: ignore[misc]
 @contextmanager
 def serving(port: int) -> Iterator[LocalServer]:
     """A server on a port of this machine, 0 for any that is free; it ends with the block. Only its own page reaches it.
-
-    Raises UsageError where the port is taken; the library would take the next one.
-    """
+    Raises UsageError where the port is taken; the library would take the next one."""
     # Browsers open connections in advance and close them unused, which is not an error.
     logging.getLogger("websockets.server").setLevel(logging.CRITICAL)
     with redirect_stdout(io.StringIO()), own_pages_only():  # viser prints a banner

@@ -132,10 +132,8 @@ def trial_title(row: "pd.Series[Any]") -> str:
 def played_again(
     actor: Actor, row: "pd.Series[Any]", interrupted: Callable[[], bool], progress: Callable[[float], None]
 ) -> Track:
-    """The trial of a row of the actor's table, taken down step by step.
-
-    progress: receives the time reached within the trial [s]. Raises Interrupted once `interrupted()` is true.
-    """
+    """The trial of a row of the actor's table, step by step; progress: receives the time reached within the trial [s].
+    Raises Interrupted once `interrupted()` is true."""
     seen: list[Moment] = []
     with playing(actor.world, [replayed(row)]) as environment:
         recorder, policy = MomentRecorder(environment.batch, recorded(environment)), in_batch(actor.policy, row)

@@ -120,10 +120,8 @@ def read_about(path: Path) -> dict[str, str]:
 
 
 def read_messages(path: Path) -> Iterator[tuple[str, float, bytes]]:
-    """Topic, time [s] and data of every message, as written; a truncated file is read up to the cut.
-
-    Raises UsageError for a missing file, Damaged for one without a message.
-    """
+    """Topic, time [s] and data of every message, as written; a truncated file is read up to the cut. Raises UsageError
+    for a missing file, Damaged for one without a message."""
     with _opened(path) as file:
         found = False
         try:
@@ -182,11 +180,9 @@ def export_digest(controller: Controller) -> str:
 
 
 def replay(path: Path, folder: Path) -> tuple[int, int]:
-    """Replays the inputs of a log through the state machine of the exported controller in `folder`; returns the number
-    of cycles, and of those whose command is not bit-identical.
-
-    Raises UsageError for the log of another export, Damaged for a file that is no log.
-    """
+    """Replays a log's inputs through the state machine of the exported controller in `folder`; returns the number of
+    cycles, and of those whose command is not bit-identical. Raises UsageError for the log of another export, Damaged
+    for a file that is no log."""
     about = read_about(path)
     controller = Controller.load(folder)
     if export_digest(controller) != about["export"]:

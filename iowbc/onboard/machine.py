@@ -221,10 +221,8 @@ class Machine:
             self.controller.reset(scene=self._scene)
 
     def _act(self, given: CycleInputs) -> None:
-        """A policy step when one is due; if it is late or its targets are held, the robot damps.
-
-        The first step has the command of the standing posture, from which later ones approach the operator's.
-        """
+        """A policy step when one is due; if it is late or its targets are held, the robot damps. The first step has the
+        command of the standing posture, from which later ones approach the operator's."""
         first, now = self._due is None, given.now
         due = now if self._due is None else self._due
         if now < due - 0.5 / FREQUENCY:

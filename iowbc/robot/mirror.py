@@ -66,10 +66,8 @@ def side_by_side(maps: Sequence[MirrorMap]) -> MirrorMap:
 
 
 def joint_mirror(robot: Robot) -> MirrorMap:
-    """Mirror of all joint positions, velocities or torques, in MJCF order, shape (..., joints).
-
-    A hinge is an axial vector: reflection keeps a rotation about y and reverses one about x or z.
-    """
+    """Mirror of all joint positions, velocities or torques, in MJCF order, shape (..., joints). A hinge is an axial
+    vector: reflection keeps a rotation about y and reverses one about x or z."""
     other = {"left": "right", "right": "left"}
     sides = [(other.get(side, side), rest) for side, *rest in (name.split("_") for name in robot.joints)]
     permutation = np.array([robot.joints.index("_".join([side, *rest])) for side, rest in sides])

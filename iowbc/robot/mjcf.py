@@ -148,9 +148,7 @@ def small_text(path: Path) -> str:
 
 def read_tree(path: Path) -> Tree:
     """Reads a self-contained MJCF, with its numbers on the elements themselves (classes decide contact and look).
-
-    Raises OSError, or ValueError with what is wrong.
-    """
+    Raises OSError, or ValueError with what is wrong."""
     try:
         root = ElementTree.fromstring(small_text(path))
     except ElementTree.ParseError as error:

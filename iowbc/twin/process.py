@@ -45,10 +45,8 @@ class ObjectTracking:
 def serve(
     bus: "DdsBus", twin: Twin, going: Callable[[], bool], each: Callable[[Twin], None], *, lockstep: bool
 ) -> None:
-    """Simulates the robot while `going`, and calls `each` after every period.
-
-    In lock step, every state waits for its command, as long as commands come.
-    """
+    """Simulates the robot while `going`, and calls `each` after every period. In lock step, every state waits for its
+    command, as long as commands come."""
     due, following = time.monotonic(), False
     while going():
         if twin.periods % BATTERY_PERIODS == 0:

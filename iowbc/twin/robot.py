@@ -159,10 +159,8 @@ class Twin:
 
 
 def low_state(tick: int, seen: Measured, torque: Array) -> Record:
-    """State message of a row of measurements; `tick` [ms]; estimated torques (joints,) [N·m].
-
-    Gravity and heading are sent as an orientation, which drops noise in the norm of gravity.
-    """
+    """State message of a row of measurements; `tick` [ms]; estimated torques (joints,) [N·m]. Gravity and heading are
+    sent as an orientation, which drops noise in the norm of gravity."""
     message = messages.empty(messages.LOW_STATE)
     message["mode_machine"], message["tick"] = MODEL, tick
     motors, imu = message["motor_state"][: len(torque)], message["imu_state"]
