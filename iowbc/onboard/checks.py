@@ -141,18 +141,17 @@ def _dry_run(controller: Controller, sensors: Sensors, scene: str, wanted: Array
     if not quantities(of_object=True).keys().isdisjoint(port.name for port in controller.contract.inputs):
         return CheckResult("policy", True, "observes the object: not tried, because its pose is not known yet")
     controller.reset(scene=scene)
-    default, furthest, joint = np.array(controller.contract.default_position), 0.0, 0
+    default = np.array(controller.contract.default_position)
+    away = np.zeros(len(default))
     for step in range(DRY_STEPS):
         targets = controller.step(sensors.measured, wanted, measured_at=float(step))
         if targets.held[0]:
             return CheckResult("policy", False, targets.reasons[0])
-        away = np.abs(targets.position[0] - default)
-        joint = int(np.argmax(away))
-        furthest = max(furthest, float(away[joint]))
+        away = np.maximum(away, np.abs(targets.position[0] - default))
     controller.reset()
-    name = controller.contract.joints[joint]
+    furthest, name = away.max(), controller.contract.joints[int(away.argmax())]
     return CheckResult(
-        "policy", furthest <= FURTHEST, f"targets at most {furthest:.2f} rad from the default posture ({name})"
+        "policy", bool(furthest <= FURTHEST), f"targets at most {furthest:.2f} rad from the default posture ({name})"
     )
 
 

@@ -1,9 +1,12 @@
 """Checks before a robot moves."""
 
+import itertools
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 from rich.console import Console
 from still import Still
@@ -77,6 +80,23 @@ def test_a_joint_beyond_its_limit_is_refused(still: Still) -> None:
     still.posture = still.posture.copy()
     still.posture[3] = -0.4
     assert "joints" in failed(still, heard(still))
+
+
+def test_the_dry_run_names_the_joint_whose_target_is_furthest_in_any_step(
+    still: Still, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    contract = still.controller.contract
+    targets = itertools.chain([(7, 2.0)], itertools.repeat((3, 0.5)))
+
+    def step(*given: Any, **named: Any) -> SimpleNamespace:
+        joint, away = next(targets)
+        position = np.array([contract.default_position])
+        position[0, joint] += away
+        return SimpleNamespace(position=position, held=[False])
+
+    monkeypatch.setattr(still.controller, "step", step)
+    found = checks(still.controller, heard(still), "free", still.standing, LIMITS)[-1]
+    assert found.text == f"targets at most 2.00 rad from the default posture ({contract.joints[7]})"
 
 
 def test_the_verdicts_are_seen_in_a_narrow_terminal_and_a_waived_failure_passes(
