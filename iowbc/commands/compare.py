@@ -4,7 +4,7 @@ import math
 import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
@@ -51,8 +51,8 @@ def compare(
     as_json: options.AsJson = False,
     runs: options.RunsFolder = options.RUNS,
 ) -> None:
-    """Write `metrics.md`, learning curves, and the report over all trials, under `output`; print the tables. Of a study
-    those recipes are compared that have finished. Raises `UsageError`."""
+    """Write `metrics.md`, learning curves, and the report over all trials, under `output`; print the tables. Of a
+    study, compare the finished recipes. Raises `UsageError`."""
     store = Store(Runs(runs))
     found = _recipes(store, words, "compare")
     study = next((word for word in words if members_of(word)), "")
@@ -82,7 +82,13 @@ def write_comparison(
         _film(store, console, tried, output / FILM, quiet=as_json)
     curves = _learning_curves(found, output)
     if as_json:
-        print_json(console, _data(found, output))
+        rows = [
+            {"stage": stage, "run": run.label, **artifact.metrics}
+            for run in found
+            for stage, artifact in run.artifacts.items()
+        ]
+        files = [path for part in (output, *(output / name for name in COMPARED)) for path in part.glob("*.*")]
+        print_json(console, {"metrics": rows, "files": [shown_path(path) for path in sorted(files)]})
         return
     for table in (metrics, *read_tables(output / "tables")):
         console.print(drawn(table, console.width) if table.rows else "no metric differs")
@@ -135,8 +141,7 @@ def report(
         for line in (f"{found[0].label} → {other.label}", *(f"  {text}" for text in difference_lines(found[0], other)))
     ]
     tables, media = _joined(store, found)
-    main, others = split_tables(tables)
-    write_page(output, found, grouped(found), main, others, differences, media)
+    write_page(output, found, *split_tables(tables), differences, media)
     tell(console, f"{shown_path(output)} ({decimal(output.stat().st_size)}): open it in any browser, no network needed")
 
 
@@ -163,17 +168,6 @@ def _joined(store: Store, found: Sequence[Run]) -> tuple[list[Table], dict[str, 
         film = film_of(store.runs, [run.label for run in found])
         media = [*sorted((output / "figures").glob("*.png")), *([film] if film else [])]
         return read_tables(output / "tables"), {path.name: path.read_bytes() for path in media}
-
-
-def _data(found: Sequence[Run], output: Path) -> dict[str, Any]:
-    """The comparison for other programs: every metric of every run, and the files that were written."""
-    metrics = [
-        {"stage": stage, "run": run.label, **artifact.metrics}
-        for run in found
-        for stage, artifact in run.artifacts.items()
-    ]
-    files = [path for part in (output, *(output / name for name in COMPARED)) for path in part.glob("*.*")]
-    return {"metrics": metrics, "files": [shown_path(path) for path in sorted(files)]}
 
 
 def _learning_curves(found: Sequence[Run], output: Path) -> "dict[str, list[CurvePanel]]":
@@ -207,11 +201,8 @@ def _having(runs: Sequence[Run], name: str) -> list[Run]:
 def _with_unique_labels(
     runs: Sequence[Run], name: str, together: bool = True
 ) -> "tuple[list[pd.DataFrame], dict[str, str]]":
-    """A table of each run's evaluation with unambiguous variant names, and the original labels of renamed variants.
-
-    Runs that differ only in their seed are trainings of one variant, unless `together` is false. A variant whose label
-    is not unique is named after its first run.
-    """
+    """A table of each run's evaluation with unique names of variants, and the labels of those named after their first
+    run instead. Runs that differ only in their seed are trainings of one variant, unless `together` is false."""
     import pandas as pd
 
     from iowbc.evaluation.report.aggregate import TRAINING
@@ -239,9 +230,8 @@ def _report_probes(found: Sequence[Run], output: Path) -> None:
 
 
 def report_joint(runs: Sequence[Run], output: Path, missing: Sequence[str] = ()) -> None:
-    """Write tables and figures over all trials of the runs under `output`; `missing`: recipes that belong to them and
-    have not run. An evaluation that several runs share counts once. Raises `UsageError` where the runs count masses
-    differently."""
+    """Write tables and figures over all trials of the runs, a shared evaluation once; `missing`: recipes of the study
+    that have not run. Raises `UsageError` where the runs count masses differently."""
     import pandas as pd
 
     from iowbc.evaluation.report.report import write_report
@@ -309,19 +299,17 @@ def film_joint(store: Store, console: Console, runs: Sequence[Run], output: Path
 
 
 def _film(store: Store, console: Console, tried: Sequence[Run], path: Path, quiet: bool = False) -> None:
-    """Play one trial that all share again, with the policies that were evaluated, and film it side by side: the first
-    training of each recipe, or all of them where there is one recipe."""
+    """Film a trial that all share, with the evaluated policies side by side: the first training of each recipe, or all
+    of them where there is one recipe."""
     from iowbc.evaluation.side_by_side import common_trial, film_side_by_side
 
     first = [group.runs[0].label for group in grouped(tried)]
-    chosen = [
-        (run.artifacts["eval"], table)
+    progress = film_progress(console, None if quiet else path)
+    actors = [
+        evaluated_actor(store, run.artifacts["eval"], table)
         for run, table in zip(tried, _with_unique_labels(tried, TRIALS)[0], strict=True)
         if len(first) == 1 or run.label in first
     ]
-    progress = film_progress(console, None if quiet else path)
-    actors = [evaluated_actor(store, artifact, table) for artifact, table in chosen]
-    rows = common_trial(actors)
-    if not rows:
+    if not (rows := common_trial(actors)):
         raise UsageError("the runs share no trial to film: their evaluations have no suite and mass in common")
     film_side_by_side(actors, rows, path, progress=progress)

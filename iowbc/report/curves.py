@@ -149,7 +149,7 @@ def _columns(folder: Path) -> dict[str, Values]:
 
 
 def _suites(folder: Path) -> dict[str, dict[str, tuple[Values, Values, Values, Values]]]:
-    """Masses, means, and both ends of the interval, by suite that varies the mass and by error.
+    """Masses, means, and both ends of the interval, by suite that varies the mass and by error; NaN where unknown.
 
     Intervals of errors are clipped at 0; for a mean over one trial the ends are NaN.
     """
@@ -160,22 +160,19 @@ def _suites(folder: Path) -> dict[str, dict[str, tuple[Values, Values, Values, V
         return {}
     if not {"suite", "case", "mass"} <= {*rows}:
         return {}
-    rows = rows.assign(mass=_numbers(rows, "mass")).dropna(subset="mass").sort_values("mass", kind="stable")
+    _, *errors = ERRORS
+    wanted = ["mass", "rate", "rate_low", "rate_high", *errors, *(f"{name}_half" for name in errors)]
+    numbers = rows.reindex(columns=wanted).apply(pd.to_numeric, errors="coerce").astype(np.float64)
+    swept = numbers[rows["suite"] == rows["case"]].dropna(subset="mass").sort_values("mass", kind="stable")
     found = {}
-    for suite, own in rows[rows["suite"] == rows["case"]].groupby("suite", sort=False):
-        mass = _numbers(own, "mass")
-        if len(set(mass)) < SWEPT:
-            continue
-        found[suite] = {"rate": (mass, _numbers(own, "rate"), _numbers(own, "rate_low"), _numbers(own, "rate_high"))}
-        for name in list(ERRORS)[1:]:
-            mean, half = _numbers(own, name), _numbers(own, f"{name}_half")
-            found[suite][name] = mass, mean, np.clip(mean - half, 0.0, None), mean + half
+    for suite, own in swept.groupby(rows["suite"], sort=False):
+        if own["mass"].nunique() >= SWEPT:
+            mass, rate, low, high, *_ = own.to_numpy().T
+            found[suite] = {"rate": (mass, rate, low, high)}
+            for name in errors:
+                mean, half = own[[name, f"{name}_half"]].to_numpy().T
+                found[suite][name] = mass, mean, np.clip(mean - half, 0.0, None), mean + half
     return found
-
-
-def _numbers(rows: pd.DataFrame, name: str) -> Values:
-    """A column as numbers; NaN for other cells or a missing column."""
-    return np.asarray(pd.to_numeric(rows.get(name, pd.Series(np.nan, rows.index)), errors="coerce"), np.float64)
 
 
 def _thinned(across: Values, values: Values, most_points: int) -> tuple[Values, Values]:

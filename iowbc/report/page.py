@@ -5,7 +5,6 @@ import secrets
 import time
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
-from importlib.resources import files
 from pathlib import Path
 
 from iowbc.files import write_whole
@@ -13,7 +12,7 @@ from iowbc.learning.curves import FIGURE
 from iowbc.pipeline.console.wording import KEY_LENGTH, duration
 from iowbc.pipeline.store.artifact import INGREDIENTS, RECIPE, Artifact
 from iowbc.report.curves import evaluation_panels, learning_panels
-from iowbc.report.runs import Group, Run, metrics_table
+from iowbc.report.runs import Run, grouped, metrics_table
 from iowbc.results.table import Table
 from iowbc.stages.registry import STAGES
 
@@ -23,26 +22,23 @@ KINDS = {".png": "image/png", ".mp4": "video/mp4"}
 def write_page(
     path: Path,
     runs: Sequence[Run],
-    groups: Sequence[Group],
     tables: Sequence[Table],
     more_tables: Sequence[Table],
     differences: Sequence[str],
     together: Mapping[str, bytes],
 ) -> None:
-    """Write the page about some runs.
+    """Write the page about some runs; `more_tables` are folded at first.
 
-    tables: the main result tables; more_tables: those that can be unfolded. differences: lines that say how the
-    runs differ. together: pictures and films of all of them, by file name.
+    differences: lines that say how the runs differ. together: pictures and films of all of them, by file name.
     """
-    from jinja2 import Environment
+    from jinja2 import Environment, PackageLoader
     from plotly.offline import get_plotlyjs
 
-    template = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True).from_string(
-        files("iowbc.report").joinpath("page.html").read_text(encoding="utf-8")
-    )
-    trained = [name for name, stage in STAGES.items() if stage.trained_by]
-    learning = [(stage, *learning_panels(groups, stage)) for stage in trained]
-    text = template.render(
+    loader = PackageLoader("iowbc.report", "")
+    environment = Environment(loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    groups = grouped(runs)
+    learning = [(name, *learning_panels(groups, name)) for name, stage in STAGES.items() if stage.trained_by]
+    text = environment.get_template("page.html").render(
         title=" · ".join(run.label for run in runs),
         made=time.strftime("%Y-%m-%d %H:%M"),
         version=version("iowbc"),
@@ -67,10 +63,8 @@ def write_page(
 
 
 def _media(runs: Sequence[Run], folder: str, together: Mapping[str, bytes], kind: str) -> list[tuple[str, str, str]]:
-    """Owner, name, and content as a data address of every film or picture, those of all runs first, each artifact once.
-
-    The picture of the learning curves is left out: the page draws them.
-    """
+    """Owner, name, and content as a data address of every film or picture, those of all runs first, each artifact once;
+    without the picture of the learning curves, which the page draws."""
     found = [("all runs", Path(name), content) for name, content in together.items() if name.endswith(kind)]
     seen = set()
     for run in runs:

@@ -13,9 +13,6 @@ from iowbc.pipeline.store.artifact import Artifact
 from iowbc.recipe.recipe import SEEDS
 from iowbc.results.table import Cell, Column, MeanCell, Table, heads
 
-NAMING = ("name", "description", "execution")
-"""Parts of a recipe in which runs of one group may differ, beside their seeds."""
-
 
 @dataclass(frozen=True)
 class Run:
@@ -118,5 +115,5 @@ def _of_one_variant(first: Run, second: Run) -> bool:
 
 def _seedless(recipe: Mapping[str, Any]) -> dict[str, Any]:
     """The values of a recipe by dotted path, without its seeds, name, description and execution."""
-    own = {name: value for name, value in recipe.items() if name not in NAMING}
+    own = {name: value for name, value in recipe.items() if name not in ("name", "description", "execution")}
     return {path: value for path, value in flattened(own).items() if path not in SEEDS} if own else {}

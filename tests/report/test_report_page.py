@@ -214,7 +214,7 @@ def hostile_page(runs: list[Run], folder: Path) -> Path:
     path = folder / "page.html"
     table = Table("t", HOSTILE, heads(HOSTILE, "b"), [(HOSTILE, "2")])
     media = {f"{HOSTILE}.png": b"picture", f"{HOSTILE}.mp4": b"film"}
-    write_page(path, runs, grouped(runs), [table], [table], [HOSTILE], media)
+    write_page(path, runs, [table], [table], [HOSTILE], media)
     return path
 
 
@@ -265,7 +265,7 @@ def test_the_picture_of_curves_that_the_page_draws_is_left_out(runs: list[Run], 
 
 def test_what_shows_all_runs_comes_first(runs: list[Run], tmp_path: Path) -> None:
     media = {"comparison.png": b"picture", "side_by_side.mp4": b"film"}
-    write_page(tmp_path / "page.html", runs, grouped(runs), [], [], [], media)
+    write_page(tmp_path / "page.html", runs, [], [], [], media)
     text = (tmp_path / "page.html").read_text()
     for name, content in media.items():
         assert f"all runs: {name}</figcaption>" in text
@@ -286,7 +286,7 @@ def test_a_wide_table_scrolls_by_itself_and_does_not_widen_the_page(
 def written(runs: list[Run], folder: Path) -> Path:
     path = folder / "page.html"
     table, other = (Table(cell, "A caption.", heads("a", "b"), [(cell, "<2>")]) for cell in ("main", "folded"))
-    write_page(path, runs, grouped(runs), [table], [other], ["teacher.gamma: 0.99 -> 0.9"], {})
+    write_page(path, runs, [table], [other], ["teacher.gamma: 0.99 -> 0.9"], {})
     return path
 
 
