@@ -1,8 +1,7 @@
 """`iowbc status`, `iowbc ls` and `iowbc show`: work in progress, stored artifacts, and one of them in detail."""
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 from rich.columns import Columns
@@ -33,10 +32,16 @@ from iowbc.recipe.recipe import PIPELINE, Recipe
 def status(as_json: options.AsJson = False, runs: options.RunsFolder = options.RUNS) -> None:
     """Print running and unfinished stages, the finished stages of each recipe, and the backlog of MLflow."""
     store, console = Store(Runs(runs)), stdout_console()
-    if as_json:
-        print_json(console, _data(store))
-        return
     going_on, recipes = unfinished(store.runs), _readable_recipes(store)
+    if as_json:
+        own = {"stage", "recipe", "done", "total", "seconds", "attempts", "updated", "note"}
+        working = [
+            record.model_dump(include=own) | {"key": folder.name, "holder": holder(store.runs, folder.name)}
+            for folder, record in going_on
+        ]
+        stages = {name: recall(store.runs, name).stages for name in recipes}
+        print_json(console, {"unfinished": working, "recipes": stages, "unsent": len(backlog(store.runs))})
+        return
     for folder, record in going_on:
         _print_work(store, console, folder, record)
     stopped = [record.command for folder, record in going_on if not holder(store.runs, folder.name)]
@@ -86,19 +91,6 @@ def _print_work(store: Store, console: Console, folder: Path, record: Progress) 
         console.print(Padding(Text(text), (0, 0, 0, 2)))
 
 
-def _data(store: Store) -> dict[str, Any]:
-    working = [
-        {
-            **record.model_dump(include={"stage", "recipe", "done", "total", "seconds", "attempts", "updated", "note"}),
-            "key": folder.name,
-            "holder": who.model_dump() if (who := holder(store.runs, folder.name)) else None,
-        }
-        for folder, record in unfinished(store.runs)
-    ]
-    recipes = {name: recall(store.runs, name).stages for name in _readable_recipes(store)}
-    return {"unfinished": working, "recipes": recipes, "unsent": len(backlog(store.runs))}
-
-
 def ls(
     stage: Annotated[
         str | None, typer.Argument(help="Only artifacts of this stage.", autocompletion=completion.stages)
@@ -114,12 +106,11 @@ def ls(
     for recipe in _readable_recipes(store):
         for key in ever_used(store.runs, recipe):
             users.setdefault(key, []).append(recipe)
+    artifacts = store.artifacts(stage)
     if as_json:
-        found = [artifact_data(artifact) for artifact in store.artifacts(stage)]
-        print_json(console, [data | {"used_by": users.get(data["key"], [])} for data in found])
+        print_json(console, [artifact_data(one) | {"used_by": users.get(one.manifest.key, [])} for one in artifacts])
         return
     table = plain_table("stage", "key", "used by", "made", "took", "size")
-    artifacts = store.artifacts(stage)
     for artifact in artifacts:
         manifest = artifact.manifest
         table.add_row(
@@ -141,9 +132,7 @@ def show(word: options.Named, as_json: options.AsJson = False, runs: options.Run
     store, console = Store(Runs(runs)), stdout_console()
     found = named(store, word)
     if as_json:
-        artifacts = [
-            artifact_data(artifact) | {"ingredients": artifact.ingredients} for artifact in found.artifacts.values()
-        ]
+        artifacts = [artifact_data(one) | {"ingredients": one.ingredients} for one in found.artifacts.values()]
         print_json(console, {"recipe": found.recipe, "stages": artifacts} if found.recipe else artifacts)
         return
     if found.recipe:
@@ -161,6 +150,8 @@ def show(word: options.Named, as_json: options.AsJson = False, runs: options.Run
 def _show_artifact(store: Store, artifact: Artifact, console: Console) -> None:
     manifest, ingredients = artifact.manifest, artifact.ingredients
     inputs = ingredients.get("inputs", {})
+    usual, own = flattened(Recipe(name="default").model_dump(mode="json")), flattened(ingredients.get("recipe", {}))
+    unusual = [f"{path}: {shown(value)}" for path, value in own.items() if path not in usual or usual[path] != value]
     grid = Table.grid(padding=(0, 2))
     grid.add_column(no_wrap=True)
     grid.add_column(overflow="fold")
@@ -173,7 +164,7 @@ def _show_artifact(store: Store, artifact: Artifact, console: Console) -> None:
         "metrics": "\n".join(f"{name} {figure(value, 6)}" for name, value in artifact.metrics.items()),
         "files": "\n".join(f"{name} ({decimal(record.size)})" for name, record in manifest.files.items()),
         "versions": ", ".join(f"{name} {version}" for name, version in manifest.versions.items()),
-        "recipe": "\n".join(_unusual(ingredients.get("recipe", {}))),
+        "recipe": "\n".join([*unusual, "all else is default"]),
     }
     for name, text in rows.items():
         if text:
@@ -181,11 +172,3 @@ def _show_artifact(store: Store, artifact: Artifact, console: Console) -> None:
     console.print(grid)
     folder = named_folder(store.runs, manifest.recipe, manifest.stage, artifact.folder)
     tell(console, f"folder  {shown_path(folder)}")
-
-
-def _unusual(slices: Mapping[str, Any]) -> list[str]:
-    """The values of a stage's part of the recipe that are not the defaults."""
-    usual = flattened(Recipe(name="default").model_dump(mode="json"))
-    own = flattened(slices)
-    found = [f"{path}: {shown(value)}" for path, value in own.items() if path not in usual or usual[path] != value]
-    return [*found, "all else is default"]

@@ -26,8 +26,7 @@ if TYPE_CHECKING:
     from iowbc.twin.robot import Twin
 
 LISTENING = 3.0
-"""Time of listening to the bus before the checks [s]; the battery's state is assumed to arrive once or twice per
-second."""
+"""Time of listening to the bus before the checks [s]; the battery's state should arrive once or twice per second."""
 POLLING = 5
 """Periods of the bus between two looks for a request of the page."""
 Network = Annotated[str, typer.Option(help="Network interface: lo for this machine, eth0 or another for a robot.")]
@@ -208,10 +207,7 @@ def robot_sim(
                 reported = True
                 tell(console, f"{robot.time:8.3f} s  fallen")
 
-        def going() -> bool:
-            return not stop.is_set() and twin.time < seconds
-
-        serve(bus, twin, going, watch, lockstep=lockstep)
+        serve(bus, twin, lambda: not stop.is_set() and twin.time < seconds, watch, lockstep=lockstep)
         tell(console, twin.verdict)
 
 
