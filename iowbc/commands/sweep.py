@@ -94,16 +94,9 @@ def _require_origins(asked: Request, planners: Sequence[Planner]) -> None:
         raise UsageError(f"the points begin from what is not made yet; first\n  {lines}")
 
 
-def run_sweep(
-    asked: Request, file: Path | None, jobs: int | None, most: int, console: Console, quiet: bool = False
-) -> int:
-    """Run all points; returns the exit code. Raises `RecipeError`, or `UsageError` if another recipe has to run first.
-
-    jobs: points that run in parallel; default 1, on a cluster as many as its cores allow. file, most: see
-    `point_planners`.
-
-    A failed point does not stop the others. Stored artifacts are used, and unfinished stages are resumed.
-    """
+def run_sweep(asked: Request, file: Path | None, jobs: int | None, most: int, console: Console, quiet: bool) -> int:
+    """Run all points, even if some fail; returns the exit code. Raises `RecipeError`, or `UsageError` if another recipe
+    has to run first. file, most: see `point_planners`; jobs: see `_shared_out`."""
     found, planners = point_planners(asked, file, most)
     _require_origins(asked, planners)
     runs, execution = asked.runs, planners[0].loaded.recipe.execution
@@ -154,7 +147,7 @@ def run_sweep(
 
 
 def _shared_out(planners: Sequence[Planner], jobs: int | None, cluster: "Cluster | None") -> tuple[int, int]:
-    """Points that run in parallel, and default worker processes of each."""
+    """Points that run in parallel, by default one or what a cluster's cores allow, and worker processes of each."""
     cores = available_cores() if cluster is None else cluster.cores
     actors = max(one.loaded.recipe.execution.rollout_actors or 1 for one in planners)
     jobs = jobs or (1 if cluster is None else max(1, min(cores // actors, len(planners))))
@@ -176,7 +169,7 @@ def _conclude(
     results = table(found, lines)
     paths = write_results(found, lines, finished, states, folder)
     if record is not None:
-        means = {f"{line.label}/{name}": mean for line in lines for name, mean in line.means.items()}
+        means = {f"{line.label}/{name}": mean for line in lines for name, (mean, _) in line.figures.items()}
         figures = {name: mean for name, mean in means.items() if math.isfinite(mean)}
         record.describe(markdown(results), figures, [folder / SWEEP_TABLE])
     console.print(drawn(results, console.width))

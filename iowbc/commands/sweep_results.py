@@ -29,10 +29,8 @@ class Line:
     settings: Mapping[str, JsonValue]
     """By the last word of their paths, or the whole path where two end alike."""
     runs: int
-    means: Mapping[str, float]
-    """Mean of each outcome; all lines have the same. NaN where there is none, as in the next."""
-    halves: Mapping[str, float]
-    """Half the interval of each mean."""
+    figures: Mapping[str, tuple[float, float]]
+    """Mean and half its interval of each outcome, NaN where there is none; all lines have the same outcomes."""
 
 
 def outcomes(sweep: Sweep, found: Mapping[str, Run]) -> list[Line]:
@@ -49,18 +47,20 @@ def outcomes(sweep: Sweep, found: Mapping[str, Run]) -> list[Line]:
     for group in groups.values():
         own = {name: group[0].settings[path] for name, path in zip(names, settings, strict=True)}
         runs = [found[point.name] for point in group]
-        means, halves = dict.fromkeys(metrics, math.nan), dict.fromkeys(metrics, math.nan)
-        for name in metrics:
-            # Points that share an artifact count as one measurement.
-            stage = name.partition(" ")[0]
-            once = {run.artifacts[stage].manifest.key: _metric(run, name) for run in runs if stage in run.artifacts}
-            values = np.array([value for value in once.values() if math.isfinite(value)], np.float64)
-            if len(values):
-                alike = len(values) > 1 and not np.ptp(values)
-                means[name], halves[name] = float(values.mean()), 0.0 if alike else mean_half_width(values)
         label = ", ".join(f"{name} {written(value)}" for name, value in own.items()) or sweep.name
-        lines.append(Line(label, own, len(runs), means, halves))
+        lines.append(Line(label, own, len(runs), {name: _mean(runs, name) for name in metrics}))
     return lines
+
+
+def _mean(runs: Sequence[Run], name: str) -> tuple[float, float]:
+    """Mean of a `stage metric` and half its interval, or NaN; runs that share an artifact count as one measurement."""
+    stage = name.partition(" ")[0]
+    once = {run.artifacts[stage].manifest.key: _metric(run, name) for run in runs if stage in run.artifacts}
+    values = np.array([value for value in once.values() if math.isfinite(value)], np.float64)
+    if not len(values):
+        return math.nan, math.nan
+    alike = len(values) > 1 and not np.ptp(values)
+    return float(values.mean()), 0.0 if alike else mean_half_width(values)
 
 
 def _metric(run: Run, name: str) -> float:
@@ -71,19 +71,17 @@ def _metric(run: Run, name: str) -> float:
 
 def _chosen(runs: Sequence[Run]) -> tuple[str, ...]:
     """Main metrics in which points differ, those of the last stages first; if none differs, those of the last stage."""
-    known = list(
-        dict.fromkeys(
-            f"{stage} {name}"
-            for stage in reversed(PIPELINE)
-            for run in runs
-            if stage in run.artifacts
-            for name, _ in headline(stage, run.artifacts[stage].metrics)
-        )
+    found = (
+        f"{stage} {name}"
+        for stage in reversed(PIPELINE)
+        for run in runs
+        if stage in run.artifacts
+        for name, _ in headline(stage, run.artifacts[stage].metrics)
     )
+    known = list(dict.fromkeys(found))
     differing = [name for name in known if len({_metric(run, name) for run in runs}) > 1]
     last = [name for name in known if name.partition(" ")[0] == known[0].partition(" ")[0]]
-    chosen = (differing or last)[:OUTCOMES_SHOWN]
-    return tuple(sorted(chosen, key=known.index, reverse=True))
+    return tuple(reversed((differing or last)[:OUTCOMES_SHOWN]))
 
 
 def write_results(
@@ -108,9 +106,9 @@ def table(sweep: Sweep, lines: Sequence[Line]) -> Table:
         (
             *map(written, line.settings.values()),
             str(line.runs),
-            *(measured(mean, line.halves[name], ".4g", ".2g", none="") for name, mean in line.means.items()),
+            *(measured(mean, half, ".4g", ".2g", none="") for mean, half in line.figures.values()),
         )
         for line in lines
     ]
     caption = f"Sweep {sweep.name}: means over seeds with their 95 % interval."
-    return Table(sweep.name, caption, heads(*lines[0].settings, "seeds", *lines[0].means), rows, grouped=False)
+    return Table(sweep.name, caption, heads(*lines[0].settings, "seeds", *lines[0].figures), rows, grouped=False)
