@@ -15,14 +15,13 @@ from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import robot_folder
 
 BenchRecipe = Annotated[Path | None, typer.Argument(help="Recipe file (default: built-in values).", metavar="RECIPE")]
-BenchWorkers = Annotated[list[int] | None, typer.Option("--workers", help="Worker processes (repeatable).", min=1)]
 
 
 def sim(
     recipe: BenchRecipe = None,
     scene: options.SceneName = "lift",
     environments: Annotated[int, typer.Option(help="Environments per worker.", min=1)] = 48,
-    workers: BenchWorkers = None,
+    workers: Annotated[list[int] | None, typer.Option(help="Worker processes (repeatable).", min=1)] = None,
     runs: options.RunsFolder = options.RUNS,
 ) -> None:
     """Measure the vector environment. Raises `UsageError`."""

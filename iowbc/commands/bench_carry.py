@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 SUITES = {"mujoco": "carry.yaml", "drake": "carry_drake.yaml"}
 """Suite of each engine, in the folder `public` of the recipes."""
 NO_DRAKE = "not installed: pip install 'iowbc[drake]'"
-DECIDING = ("simulation", "task", "eval")
-"""Sections of the suite that decide its trials."""
 FIGURES = {
     "E_v": (Column("E_v", "m/s"), ".3f"),
     "E_psi": (Column("E_ψ", "rad"), ".3f"),
@@ -145,7 +143,7 @@ def _suite_row(file: Path, trials: "pd.DataFrame") -> str:
 def suite_digest(suite: Recipe) -> str:
     """SHA-256 of the sections that determine a suite's trials; independent of the controller."""
     values = deciding(suite)
-    return data_digest({name: values[name] for name in DECIDING})
+    return data_digest({name: values[name] for name in ("simulation", "task", "eval")})
 
 
 def _suite_table(mujoco: "pd.DataFrame", drake: "pd.DataFrame | None" = None) -> Table:

@@ -119,18 +119,16 @@ def _packages() -> Iterator[Finding]:
     for requirement in map(Requirement, importlib.metadata.requires("iowbc") or []):
         if requirement.marker is not None and not requirement.marker.evaluate({"extra": "train"}):
             continue
-        wanted = f"{requirement.name}{requirement.specifier}"
+        name, wanted = requirement.name, requirement.specifier
         try:
-            version = importlib.metadata.version(requirement.name)
+            version = importlib.metadata.version(name)
+            wrong = "" if wanted.contains(version, prereleases=True) else f"{version} is not {wanted}"
         except importlib.metadata.PackageNotFoundError:
-            yield Finding(requirement.name, "bad", f"not installed; `pip install '{wanted}'`")
-            continue
-        if requirement.specifier.contains(version, prereleases=True):
-            fitting.append(f"{requirement.name} {version}")
+            wrong = "not installed"
+        if wrong:
+            yield Finding(name, "bad", f"{wrong}; `pip install '{name}{wanted}'`")
         else:
-            yield Finding(
-                requirement.name, "bad", f"{version} is not {requirement.specifier}; `pip install '{wanted}'`"
-            )
+            fitting.append(f"{name} {version}")
     yield Finding("packages", "good", ", ".join(fitting))
 
 

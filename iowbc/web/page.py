@@ -14,8 +14,9 @@ import numpy as np
 from iowbc.deploy import exported_folder
 from iowbc.errors import UsageError
 from iowbc.evaluation.exported import exported_world
+from iowbc.recipe.simulation.holding import FREE
 from iowbc.robot.description import load_robot
-from iowbc.web.scenes import first_scene, web_scenes
+from iowbc.web.scenes import accepted, web_scenes
 
 SOURCE = Path(__file__).parent / "source"
 PINNED = ("package.json", "package-lock.json")
@@ -33,14 +34,13 @@ SCENES = "scenes.json"
 
 
 def write_page(exported: Path, out: Path, cache: Path, say: Callable[[str], None]) -> None:
-    """Write a page with the controller of an exported folder into `out`, which holds all that it needs.
-
-    `cache`: where npm's packages are kept. Raises ContractBroken for a damaged export, UsageError without npm.
-    """
+    """Write a page with an exported controller, and all that it needs, into `out`; `cache`: folder of npm's packages.
+    Raises ContractBroken for a damaged export, UsageError without npm."""
     parts = npm_parts(cache, say)
     world = exported_world(exported)
-    robot = load_robot(world.robot)
-    about = {"scenes": web_scenes(world, robot), "first": first_scene(world.recipe), "golden": golden_vectors(exported)}
+    first = next((name for name, _ in accepted(world.recipe)), FREE)
+    scenes = web_scenes(world, load_robot(world.robot))
+    about = {"scenes": scenes, "first": first, "golden": golden_vectors(exported)}
     out.mkdir(parents=True, exist_ok=True)
     (out / SCENES).write_text(json.dumps(about, separators=(",", ":")), encoding="utf-8")  # first: it marks the folder
     for name in (exported_folder.SETTLE, exported_folder.STEP, exported_folder.CONTRACT):

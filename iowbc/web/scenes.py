@@ -10,7 +10,6 @@ from iowbc.arrays import Array
 from iowbc.control.command import nominal_command
 from iowbc.control.references import ReferenceLayer, both_wrists
 from iowbc.recipe.recipe import Recipe
-from iowbc.recipe.simulation.holding import FREE
 from iowbc.recipe.simulation.scene import Scene
 from iowbc.robot.description import Robot
 from iowbc.sim.model import scene_spec
@@ -33,8 +32,7 @@ FIELDS = (
 STILL = ("start_yaw", "partner_share", "impulse_scale", "push_scale", "noise_scale")
 """Quantities of an episode that are zero on the page: initial heading, partner, disturbances, sensor noise."""
 ABOVE = 1e-6
-"""Initial height above the ground [m]. For soles exactly on the ground, contacts would depend on rounding, which
-differs in the browser."""
+"""Initial height above the ground [m]: contacts of soles exactly on it would depend on the browser's rounding."""
 HEAVIEST = 1.5
 """Mass to which the page's slider goes, as a part of the object's nominal one (Table I: to 150 %)."""
 
@@ -45,16 +43,10 @@ def web_scenes(world: Specification, robot: Robot) -> dict[str, Any]:
     return {name: _web_scene(world, robot, scene, name) for name, scene in scenes if _playable(scene)}
 
 
-def first_scene(recipe: Recipe) -> str:
-    """Name of the scene that a page begins in: one in which the controller was accepted, or none with an object."""
-    return next((name for name, _ in accepted(recipe)), FREE)
-
-
 def accepted(recipe: Recipe) -> list[tuple[str, float]]:
     """Scenes and object masses [kg] of the acceptance trials that the page can show."""
-    scenes = recipe.simulation.scenes
-    trials = [(trial.scene, trial.mass) for trial in recipe.export.acceptance if trial.mass > 0.0]
-    return [(name, mass) for name, mass in trials if _playable(getattr(scenes, name))]
+    scenes, trials = recipe.simulation.scenes, recipe.export.acceptance
+    return [(one.scene, one.mass) for one in trials if one.mass > 0.0 and _playable(getattr(scenes, one.scene))]
 
 
 def _playable(scene: Scene) -> bool:
