@@ -126,8 +126,7 @@ def name_in(word: str) -> str:
 
 
 def _published(store: Store) -> dict[str, dict[str, Artifact]]:
-    """By recipe, and by stage: the artifacts that came with the repository, and those, also of other recipes, that they
-    were made from."""
+    """By recipe and stage: the published artifacts, and those, also of other recipes, that they were made from."""
     published = [one for stage in PIPELINE for one in store.published(stage)]
     newest = {one.manifest.key: store.find_any(one.manifest.stage, one.manifest.key) or one for one in published}
     found: dict[str, dict[str, Artifact]] = {}
@@ -160,8 +159,7 @@ def _by_key(store: Store, prefix: str) -> Artifact:
 
 
 def record_sweep(found: Sweep, folder: Path) -> None:
-    """Keep a sweep's points and their settings in its folder, so that other commands know them by its name; remove the
-    results of other points."""
+    """Keep a sweep's points in its folder, where other commands find them; remove the results of other points."""
     folder.mkdir(parents=True, exist_ok=True)
     points = {point.name: dict(point.settings) for point in found.points}
     if read_json(folder / SWEEP_RECORD).get("points") != points:

@@ -103,11 +103,10 @@ Named = Annotated[
 
 
 def page_port(web: bool, port: int | None) -> int | None:
-    """The free port of a page; None where there is to be none. Raises UsageError for a port without a page, and where
-    a page cannot be served."""
-    if port is not None and not web:
-        raise UsageError("--port is that of the page that --web serves; give both")
+    """The free port of a page; None without one. Raises UsageError for a port alone, or if no page can be served."""
     if not web:
+        if port is not None:
+            raise UsageError("--port is that of the page that --web serves; give both")
         return None
     require_extra("web", "--web")
     require_free(port or PORT)

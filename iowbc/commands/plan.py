@@ -60,8 +60,7 @@ def plan(
 
 
 def planned(planners: Sequence[Planner], known: Plans | None = None) -> Planned:
-    """The stages of each recipe for the current store; a stage that several recipes share runs once. `known`: plans
-    that were just made."""
+    """The stages of each recipe, those that several share once; `known`: plans that were just made."""
     makers: dict[str, str] = {}
     found: dict[str, list[StagePlan]] = {}
     for planner in planners:
@@ -133,10 +132,7 @@ def time_of(steps: Sequence[StagePlan], manner: str = "") -> str:
 
 
 def plan_table(found: Planned, what: str) -> Table:
-    """A row for each recipe, a column for each stage; `what` stands above the recipes' names.
-
-    A stage that would run has the time that it takes, without a word, so that six stages fit on 80 characters.
-    """
+    """A row for each recipe, headed by `what`, and a column for each stage, six of which fit on 80 characters."""
     names = list(dict.fromkeys(step.stage.name for own in found.values() for step in own))
     table = plain_table(what, *names)
     for recipe, own in found.items():

@@ -40,8 +40,7 @@ UNPLANNED = Run("", {})
 
 
 def planned(store: Store, word: str) -> Run:
-    """The recipe of a file, and the stored artifacts that its plan uses; `UNPLANNED` for any other word. Raises
-    `RecipeError` for a file that is wrong."""
+    """The recipe of a file with the artifacts that its plan uses, or `UNPLANNED`. Raises `RecipeError`."""
     if Path(word).suffix not in SUFFIXES or not os.path.isfile(word):
         return UNPLANNED
     loaded = load_recipe(word)
@@ -83,12 +82,9 @@ def playable_skill(store: Store, skill: Artifact, scene: str) -> "tuple[Specific
 def named_source(
     store: Store, console: Console, word: str, stage: str | None, scene: str | None, plan: Run
 ) -> "Source":
-    """The source that a word, with its plan, and `--stage` denote; prints a line if it is still in training. Raises
-    `UsageError`, also for a `scene` that its recipe lacks.
-
-    A recipe file denotes the artifacts that `iowbc plan` reports as cached. The section `eval` of that file, or of the
-    recipe's last run for a name, sets how they are played.
-    """
+    """The source that a word, with its plan, and `--stage` denote, as the section `eval` of the recipe file, or of the
+    recipe's last run, plays it; prints a line if it is still in training. Raises `UsageError`, also for a `scene` that
+    the recipe lacks."""
     from iowbc.evaluation.play import exported_source, with_evaluation
 
     if os.path.isfile(Path(word, CONTRACT)):

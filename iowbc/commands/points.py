@@ -54,10 +54,10 @@ def run_points(
     board: Board,
     start: "Callable[[PointRun], PointThread | PointProcess]",
 ) -> Endings:
-    """Run all, at most `jobs` at a time.
+    """Run all, at most `jobs` at a time; one that fails does not stop the others.
 
-    One that fails does not stop the others. Once `stop` is asked for, all that run are asked to stop after a
-    checkpoint, and none begins. Raises `KeyboardInterrupt` when asked twice, after all have ended.
+    Once `stop` is asked for, all that run are asked to stop after a checkpoint, and none begins. Raises
+    `KeyboardInterrupt` when asked twice, after all have ended.
     """
     endings: Endings = {task.name: RunEnding(NOT_BEGUN) for task in tasks}
     waiting, running = deque(tasks), dict[PointRun, PointThread | PointProcess]()
@@ -117,8 +117,7 @@ class PointThread(threading.Thread):
 
 
 class PointProcess:
-    """A run in a process forked from this one, which has no other threads. It starts at once, with the same stages and
-    signal handlers."""
+    """A run in a process forked from this one, which has no other threads; stages and signal handlers are the same."""
 
     def __init__(self, task: PointRun) -> None:
         context = multiprocessing.get_context("fork")

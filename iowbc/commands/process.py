@@ -79,8 +79,7 @@ def prepare_streams() -> None:
 
 
 def require_text(words: Sequence[str]) -> None:
-    """Raises `UsageError` for an argument that is no text, such as the name of a file in another encoding: records and
-    printed commands could not repeat it."""
+    """Raises `UsageError` for an argument in another encoding, which records and printed commands could not repeat."""
     for word in words:
         try:
             word.encode()

@@ -28,12 +28,9 @@ def publish(
     ] = None,
     runs: options.RunsFolder = options.RUNS,
 ) -> None:
-    """Copy a recipe's artifacts, and those that it begins from, to `runs/published/`, except for the files in
-    `without`, and verify the copies.
-
-    Raises `UsageError` if a stage has not run, or if no artifact has a file in `without`. Code changes since an
-    artifact was made are reported but accepted.
-    """
+    """Copy a recipe's artifacts, and those that it begins from, to `runs/published/`, and verify the copies. Changes of
+    code since then are reported but accepted. Raises `UsageError` if a stage has not run, or if no artifact has a file
+    in `without`."""
     request, console = Request(recipe, overrides or (), Runs(runs), Options(until)), stdout_console()
     without = without or []
     found = planners(request)

@@ -57,8 +57,7 @@ def planners(request: Request) -> list[Planner]:
 
 
 def point_planners(asked: Request, file: Path | None, most: int) -> tuple[Sweep, list[Planner]]:
-    """The points of a sweep, at most `most`, and the planner of each; `file`: YAML file with further variations. Raises
-    `RecipeError` for all problems that can be found before a run."""
+    """The points of a sweep, at most `most`, and their planners; `file`: with further axes. Raises `RecipeError`."""
     if asked.options.force:
         text = "names a stage that points may share; force it in one of them with `iowbc run`"
         raise RecipeError([Problem(f"--force {min(asked.options.force)}", text)])
@@ -85,8 +84,7 @@ def prepared(loaded: LoadedRecipe, runs: Runs, options: Options) -> Planner:
 
 
 def in_order(planner: Planner, known: Plans | None = None) -> list[Planner]:
-    """Planners of all that runs for a recipe: first those from whose missing artifacts it begins, then itself.
-    `known`: receives their plans."""
+    """Planners of a recipe's missing origins, in order, and its own; `known`: receives their plans."""
     known = {} if known is None else known
     if planner.origins:
         planner.plan(known)

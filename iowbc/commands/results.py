@@ -77,11 +77,8 @@ def main_tables(folders: Iterable[Path]) -> str:
 
 
 def next_commands(runs: Runs, recipe: str, artifacts: Mapping[str, Artifact]) -> list[str]:
-    """Suggested commands: to watch the robot, if there is a policy, and to read about the run.
-
-    An artifact of a run with overrides is referred to by key unless an override sets the name, because the recipe's
-    name stands for its artifacts without overrides.
-    """
+    """Suggested commands: to watch the robot, if there is a policy, and to read about the run; with the keys of a run
+    with overrides, unless one sets the name: a recipe's name stands for its artifacts without overrides."""
     overrides = recall(runs, recipe).overrides
     lasting = not overrides or any(override.startswith("name=") for override in overrides)
     own = last_used(Store(runs), recipe) if lasting else {}

@@ -136,9 +136,8 @@ def run_recipe(
 ) -> RunEnding:
     """Run one recipe.
 
-    within: parent run of a sweep in MLflow. cluster: where stages run; None for this machine. errors: console for
-    failures and the command to resume; None for standard error. workers: worker processes of a stage if neither options
-    nor recipe set them; 0: one per core.
+    within: parent run in MLflow. cluster: where stages run; None: here. errors: console for failures and the command
+    to resume; None: standard error. workers: of a stage if neither options nor recipe set them; 0: one per core.
     """
     loaded = planner.loaded
     tracker: Tracker | None = None

@@ -36,8 +36,7 @@ class Column:
     latex: str = ""
     """Heading in LaTeX, if different."""
     role: Literal["own", "paper", "detail"] = "own"
-    """`paper`: the paper's values; `detail`: nearly redundant with other columns. Narrow terminals leave both out
-    first."""
+    """`paper`: the paper's values; `detail`: nearly redundant. Narrow terminals leave both out first."""
 
     @property
     def head(self) -> str:
@@ -114,8 +113,7 @@ def markdown(table: Table) -> str:
 
 
 def latex(table: Table) -> str:
-    """A booktabs table with the paper's row groups, no wider than the text; needs the packages booktabs, multirow and
-    adjustbox."""
+    """A table with the paper's row groups, no wider than the text; needs booktabs, multirow and adjustbox."""
     import pandas as pd
 
     head = [column.latex or column.head for column in table.columns]
@@ -171,11 +169,8 @@ def read_tables(folder: Path) -> list[Table]:
 
 
 def drawn(table: Table, width: int) -> Group:
-    """A table for a terminal of `width` characters, below the first words of its caption.
-
-    Names in the second column are wrapped. If that does not suffice, these are left out in order: the paper's values,
-    intervals, detail columns, other columns from the right.
-    """
+    """A table for a terminal of `width` characters, below the first words of its caption. Names in the second column
+    wrap; then these are left out in order: the paper's values, intervals, detail columns, others from the right."""
     shown, rows = list(range(len(table.columns))), table.texts()
 
     def fits() -> bool:
