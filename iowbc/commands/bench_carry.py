@@ -75,13 +75,9 @@ def carry(
         raise UsageError(f"--engine both: Drake is {NO_DRAKE}, or give --engine mujoco")
     require_writable(out.parent, "--out")
     digest = policy_digest(policy_path(policy))
-    values: dict[str, object] = {
-        "adapter": "own" if own else adapter,
-        "policy": policy,
-        "sha256": digest,
-        "arms": arms,
-        **({"module": str(Path(adapter).resolve())} if own else {}),
-    }
+    values = {"adapter": "own" if own else adapter, "policy": policy, "sha256": digest, "arms": arms}
+    if own:
+        values["module"] = str(Path(adapter).resolve())
     overrides = [f"eval.public.{name}={json.dumps(value)}" for name, value in values.items()]
     overrides.append(f"task.references.upright={json.dumps(not posture)}")
     files = {name: recipe_file(str(Path("public", file))) for name, file in SUITES.items()}

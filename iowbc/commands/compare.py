@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 
 CURVE_WIDTH = 40
 """Characters of a learning curve."""
-NOT_TRAINED = "not evaluated yet"
 LONGEST_NAME = 100
 """Characters of the names in a report's file name."""
 
@@ -266,7 +265,7 @@ def trainings_table(groups: Sequence[Group], missing: Sequence[str] = ()) -> Tab
     rows = [
         tuple(ABSENT if n is None else f"{n:,}" if isinstance(n, int) else n for n in one.values()) for one in numbers
     ]
-    rows += [(name, NOT_TRAINED, *[ABSENT] * (1 + len(methods))) for name in missing]
+    rows += [(name, "not evaluated yet", *[ABSENT] * (1 + len(methods))) for name in missing]
     columns = heads("Recipe", "Algorithm", "Seed", *(f"Steps of {method}" for method in methods.values()))
     budget = "" if len({row["teacher"] for row in numbers}) == 1 else "not "
     lacking = f" Missing: {', '.join(missing)}." if missing else ""
@@ -284,8 +283,7 @@ def _steps_of(run: Run, stage: str) -> int | None:
 
 
 def film_joint(store: Store, console: Console, runs: Sequence[Run], output: Path) -> None:
-    """Film a trial that all evaluated runs share, unless there is a newer film, and print its path or why there is
-    none; nothing where fewer than two were evaluated."""
+    """Film a trial that two or more evaluated runs share, unless there is a newer film; print its path or why not."""
     tried, film = _having(runs, TRIALS), output / FILM
     if len(tried) < 2:
         return
@@ -299,8 +297,7 @@ def film_joint(store: Store, console: Console, runs: Sequence[Run], output: Path
 
 
 def _film(store: Store, console: Console, tried: Sequence[Run], path: Path, quiet: bool = False) -> None:
-    """Film a trial that all share, with the evaluated policies side by side: the first training of each recipe, or all
-    of them where there is one recipe."""
+    """Film a trial that all share side by side, with the first training of each recipe, or all of a single recipe."""
     from iowbc.evaluation.side_by_side import common_trial, film_side_by_side
 
     first = [group.runs[0].label for group in grouped(tried)]

@@ -21,7 +21,6 @@ from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.last_used import require_whole
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
-from iowbc.recipe.skill.skill import PartnerKinds
 from iowbc.report.runs import Run
 
 if TYPE_CHECKING:
@@ -88,12 +87,15 @@ def play(
         if page is not None and partner is not None:
             raise UsageError("--web and --partner exclude each other: on the page you are the human")
         from iowbc.skill.game import NOMINAL, ROBOT
-        from iowbc.skill.plan import PERSON, Plan
+        from iowbc.skill.plan import AGENT, PERSON, Plan
         from iowbc.skill.single_game import SingleGame
 
         world, student, robot, task = playable_skill(store, skill, scene)
-        recipe = skill.manifest.recipe
-        human = _human(world.recipe.skill.partners, partner) if page is None else PERSON
+        recipe, human, partners = skill.manifest.recipe, PERSON, world.recipe.skill.partners
+        if page is None:
+            humans = [kind for kind in (*partners.held_out, *partners.training) if kind != AGENT]
+            human = partner or humans[0]
+            require_known(human, "human of the skill", humans)
         first = Plan(task, human, known=False, mass=mass, share=partner_share, seed=seed)
         if page is None:
             with closing(SingleGame(world, student, NOMINAL | {ROBOT: robot}, first)) as game:
@@ -141,16 +143,6 @@ def _serve(console: Console, port: int, session: "Played", **shown: Any) -> None
 
     with closing(session), serving(port) as server:
         Page(server, session, **shown).run(ready)
-
-
-def _human(partners: PartnerKinds, asked: str | None) -> str:
-    """The behaviour of a game's human: as asked, else the first not met in training. Raises `UsageError`."""
-    from iowbc.skill.plan import AGENT
-
-    humans = [kind for kind in (*partners.held_out, *partners.training) if kind != AGENT]
-    human = asked or humans[0]
-    require_known(human, "human of the skill", humans)
-    return human
 
 
 def _play_game(console: Console, game: "SingleGame", title: str, video: Path | None) -> None:

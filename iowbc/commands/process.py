@@ -26,8 +26,6 @@ DONE, STAGE_FAILED, INTERRUPTED = 0, 1, 130
 """Exit codes."""
 NOT_BEGUN = 256
 """Code of a run that never began; exit codes are 0 to 255, or a negative signal number."""
-IMPORTS = "importlib._bootstrap"
-"""Module that is on the stack during an import."""
 GONE = (errno.EIO, errno.EPIPE, *FULL)
 """Errors of a closed terminal or pipe, and of a full disk."""
 STANDARD_OUTPUT = 1
@@ -57,12 +55,10 @@ def close_on_termination() -> None:
 
 
 def leave(number: int, frame: FrameType | None) -> None:
-    """Signal handler: end the command by `SystemExit`, so that open resources are closed.
-
-    During an import, which could swallow or disguise the exception, the process ends at once instead.
-    """
+    """Signal handler: end the command by `SystemExit`, so that open resources are closed; during an import, which could
+    swallow or disguise that exception, end the process at once instead."""
     while frame is not None:
-        if frame.f_globals.get("__name__") == IMPORTS:
+        if frame.f_globals.get("__name__") == "importlib._bootstrap":
             os._exit(INTERRUPTED)
         frame = frame.f_back
     sys.exit(INTERRUPTED)

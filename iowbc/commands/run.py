@@ -58,10 +58,8 @@ def run(
 
 
 def run_request(request: Request, console: Console, manner: Manner) -> int:
-    """Run a recipe to its end, a failure or an interruption; returns the exit code. Raises `RecipeError`.
-
-    The variants of a study run in order, up to the first that does not end; then they are compared.
-    """
+    """Run a recipe, or the variants of a study in order up to the first that does not end, and compare them; returns
+    the exit code. Raises `RecipeError`."""
     ready = planners(request)
     options.require_extra("train", "iowbc run")
     require_writable_runs(request.runs)

@@ -149,10 +149,8 @@ def _columns(folder: Path) -> dict[str, Values]:
 
 
 def _suites(folder: Path) -> dict[str, dict[str, tuple[Values, Values, Values, Values]]]:
-    """Masses, means, and both ends of the interval, by suite that varies the mass and by error; NaN where unknown.
-
-    Intervals of errors are clipped at 0; for a mean over one trial the ends are NaN.
-    """
+    """Masses, means, and both ends of the interval, NaN where unknown, by suite that varies the mass and by error;
+    intervals of errors are clipped at 0."""
     file = folder / "tables" / "summary.csv"
     try:
         rows = pd.read_csv(file, dtype=str, encoding_errors="replace", index_col=False)

@@ -70,8 +70,7 @@ def grouped(runs: Sequence[Run]) -> list[Group]:
 
 
 def metrics_table(groups: Sequence[Group]) -> Table:
-    """The metrics in which groups differ, or all of a single group, by stage: a column for each group, the mean with
-    half the spread over its seeds, and Δ to the first."""
+    """The metrics in which groups differ, or all of a single one: mean, half the spread over seeds, Δ to the first."""
     names: dict[str, dict[str, None]] = {}
     for run in (run for group in groups for run in group.runs):
         for stage, artifact in run.artifacts.items():

@@ -58,8 +58,7 @@ def golden_vectors(exported: Path) -> dict[str, list[Any]] | None:
 
 
 def npm_parts(cache: Path, say: Callable[[str], None]) -> Path:
-    """The `node_modules` of the pinned versions in a cache folder, fetched where they are not there yet. Raises
-    `UsageError` without Node.js and npm, or where npm cannot fetch."""
+    """The `node_modules` of the pinned versions in a cache, fetched if missing. Raises `UsageError` if npm fails."""
     folder = parts_folder(cache)
     if (folder / "node_modules").is_dir():
         return folder / "node_modules"

@@ -170,10 +170,8 @@ SHAPES = {
 
 
 def looks(dressed: Any, stepped: Any) -> list[dict[str, Any]]:
-    """Shapes of the model `dressed` for the eye, each with its body in the model that is `stepped`.
-
-    Half sizes and positions in m in the body's frame; quaternions wxyz; colours red, green, blue, alpha in 0 to 1.
-    """
+    """Shapes of the model `dressed` for the eye, each with its body in the model that is `stepped`: half sizes and
+    positions [m] in the body's frame; quaternions wxyz; colours red, green, blue, alpha in 0 to 1."""
     found = []
     for index in range(dressed.ngeom):
         shape = SHAPES.get(mujoco.mjtGeom(dressed.geom_type[index]))
