@@ -87,8 +87,7 @@ def _print_work(store: Store, console: Console, folder: Path, record: Progress) 
     parts = (record.share, f"{duration(record.seconds)} spent", f"attempt {record.attempts or '?'}", record.note)
     console.print(Padding(Text(", ".join(filter(None, parts))), (0, 0, 0, 2)))
     if values := [value for _, value in record.curve]:
-        text = f"{record.metric} {sparkline(values)} {values[-1]:.4g}"
-        console.print(Padding(Text(text), (0, 0, 0, 2)))
+        console.print(Padding(Text(f"{record.metric} {sparkline(values)} {values[-1]:.4g}"), (0, 0, 0, 2)))
 
 
 def ls(

@@ -46,9 +46,8 @@ def plan(
     each = [one for planner in planners(request) for one in in_order(planner, plans)]
     longest: dict[tuple[Path, tuple[str, ...]], Planner] = {}
     for one in each:  # a recipe may be both requested and an origin of another one
-        known = longest.setdefault((one.loaded.file, one.loaded.overrides), one)
-        if len(one.stages) > len(known.stages):
-            longest[one.loaded.file, one.loaded.overrides] = one
+        place = one.loaded.file, one.loaded.overrides
+        longest[place] = max(longest.get(place, one), one, key=lambda planner: len(planner.stages))
     found = list(longest.values())
     if as_json:
         data = [{"recipe": one.loaded.recipe.name, "stages": list(map(step_data, one.plan(plans)))} for one in found]

@@ -118,7 +118,6 @@ def play(
 
 
 def _play_episode(source: "Source", request: PlayRequest, console: Console) -> None:
-    """Play one episode in the viewer or as a film."""
     from iowbc.evaluation.play import play
 
     try:
@@ -146,7 +145,6 @@ def _serve(console: Console, port: int, session: "Played", **shown: Any) -> None
 
 
 def _play_game(console: Console, game: "SingleGame", title: str, video: Path | None) -> None:
-    """Play a game in the viewer or as a film."""
     from iowbc.skill.playing import film_game, show_game
 
     tell(console, title)

@@ -133,8 +133,7 @@ class PointProcess:
             return None
         if self._said.poll():
             with contextlib.suppress(EOFError):
-                ending: RunEnding = self._said.recv()
-                return ending
+                return self._said.recv()
         code = code or STAGE_FAILED
         return RunEnding(code, f"killed by {signal.Signals(-code).name}" if code < 0 else last_line(self._log))
 

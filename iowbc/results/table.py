@@ -118,23 +118,17 @@ def latex(table: Table) -> str:
 
     head = [column.latex or column.head for column in table.columns]
     frame = pd.DataFrame([[str(cell) for cell in row] for row in table.rows], columns=head)
-    if table.grouped:
-        style = frame.set_index(head[:2]).style.format_index(escape="latex")
-    else:
-        style = frame.style.hide(axis="index")
-    text = (
-        style.format(escape="latex")
-        .format_index(escape="latex-math", axis="columns")
-        .to_latex(
-            caption=table.caption.replace("%", r"\%").replace("_", r"\_"),
-            label=f"tab:{table.name}",
-            position="h",
-            position_float="centering",
-            hrules=True,
-            clines="skip-last;data" if table.grouped else None,
-            multirow_align="c",
-            column_format="ll" + "c" * (len(head) - 2),
-        )
+    style = frame.set_index(head[:2]).style.format_index(escape="latex") if table.grouped else frame.style.hide()
+    style = style.format(escape="latex").format_index(escape="latex-math", axis="columns")
+    text = style.to_latex(
+        caption=table.caption.replace("%", r"\%").replace("_", r"\_"),
+        label=f"tab:{table.name}",
+        position="h",
+        position_float="centering",
+        hrules=True,
+        clines="skip-last;data" if table.grouped else None,
+        multirow_align="c",
+        column_format="ll" + "c" * (len(head) - 2),
     )
     fitted = str(text).replace(r"\begin{tabular}", "\\begin{adjustbox}{max width=\\textwidth}\n\\begin{tabular}")
     return fitted.replace(r"\end{tabular}", "\\end{tabular}\n\\end{adjustbox}").translate(LATEX_SIGNS)
