@@ -40,9 +40,7 @@ def init(
         with replacing(target) as fresh:
             shutil.copytree(origin, fresh) if origin.is_dir() else shutil.copyfile(origin, fresh)
         tell(console, shown_path(target))
-    console.print(
-        f"to begin: cd {shlex.quote(str(folder))}, then `iowbc run quickstart`", highlight=False, soft_wrap=True
-    )
+    tell(console, f"to begin: cd {shlex.quote(str(folder))}, then `iowbc run quickstart`")
 
 
 def _content(path: Path) -> dict[str, bytes]:
