@@ -3,16 +3,16 @@
 import os
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from iowbc.pipeline.store.store import Store
+from iowbc.pipeline.nested import flattened
+from iowbc.pipeline.store.runs import Runs
+from iowbc.pipeline.store.store import Store
+from iowbc.recipe.reading.loading import known_files
+from iowbc.recipe.recipe import PIPELINE, Recipe
 
 
 def recipes(incomplete: str) -> list[str]:
     """Recipes that can be run by name; a path is the shell's own business."""
-    from iowbc.recipe.reading.loading import known_files
-
     return _beginning(incomplete, (path.stem for path in known_files()))
 
 
@@ -35,23 +35,15 @@ def artifacts(incomplete: str) -> list[str]:
 
 
 def stages(incomplete: str) -> list[str]:
-    from iowbc.recipe.recipe import PIPELINE
-
     return _beginning(incomplete, PIPELINE)
 
 
 def paths(incomplete: str) -> list[str]:
     """Dotted paths of a recipe's values, with the sign that a value follows."""
-    from iowbc.pipeline.nested import flattened
-    from iowbc.recipe.recipe import Recipe
-
     return _beginning(incomplete, (f"{path}=" for path in flattened(Recipe(name="any").model_dump(mode="json"))))
 
 
-def _store() -> "Store":
-    from iowbc.pipeline.store.runs import Runs
-    from iowbc.pipeline.store.store import Store
-
+def _store() -> Store:
     return Store(Runs(Path(os.environ.get("IOWBC_RUNS") or "runs")))
 
 
