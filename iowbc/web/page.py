@@ -38,8 +38,8 @@ def write_page(exported: Path, out: Path, cache: Path, say: Callable[[str], None
     Raises ContractBroken for a damaged export, UsageError without npm."""
     parts = npm_parts(cache, say)
     world = exported_world(exported)
-    first = next((name for name, _ in accepted(world.recipe)), FREE)
     scenes = web_scenes(world, load_robot(world.robot))
+    first = next((name for name, _ in accepted(world.recipe)), FREE)
     about = {"scenes": scenes, "first": first, "golden": golden_vectors(exported)}
     out.mkdir(parents=True, exist_ok=True)
     (out / SCENES).write_text(json.dumps(about, separators=(",", ":")), encoding="utf-8")  # first: it marks the folder
