@@ -54,7 +54,7 @@ def status(as_json: options.AsJson = False, runs: options.RunsFolder = options.R
             table.add_row(recipe, ", ".join(last_used(store, recipe)), ago(last))
         console.print(table)
     if not (going_on or recipes):
-        console.print(f"nothing has run in {store.runs.root} yet; `iowbc run RECIPE` starts", highlight=False)
+        tell(console, f"nothing has run in {store.runs.root} yet; `iowbc run RECIPE` starts")
     if aside := sorted(store.runs.damaged.glob(f"{DAMAGED_LINE}*")):
         text = f"{len(aside)} damaged lines of MLflow's journals were put aside, as {shown_path(aside[-1])}"
         console.print(text, highlight=False)
@@ -123,7 +123,7 @@ def ls(
     if artifacts:
         console.print(table)
     else:
-        console.print(f"nothing is stored in {store.runs.store} yet; `iowbc run RECIPE` makes it", highlight=False)
+        tell(console, f"nothing is stored in {store.runs.store} yet; `iowbc run RECIPE` makes it")
 
 
 def show(word: options.Named, as_json: options.AsJson = False, runs: options.RunsFolder = options.RUNS) -> None:

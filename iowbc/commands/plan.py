@@ -136,7 +136,7 @@ def plan_table(found: Planned, what: str) -> Table:
     table = plain_table(what, *names)
     for recipe, own in found.items():
         cells = {step.stage.name: _cell(step) for step in own}
-        table.add_row(recipe, *(cells.get(name, "") for name in names))
+        table.add_row(Text(recipe), *(cells.get(name, "") for name in names))
     return table
 
 

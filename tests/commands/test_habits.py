@@ -51,6 +51,11 @@ def test_what_is_told_can_be_read_by_programs(
     assert part(json.loads(done.stdout)) == expected
 
 
+@pytest.mark.parametrize("words", [["status", "--runs"], ["ls", "--runs"], ["init"]])
+def test_a_folder_with_brackets_is_printed_as_it_is_named(command: Command, words: list[str]) -> None:
+    assert "a[b]c" in command(*words, "a[b]c").stdout.splitlines()[-1]
+
+
 def test_a_quiet_run_prints_nothing_and_a_verbose_one_every_step(command: Command) -> None:
     assert command("run", "first.yaml", "-q").stdout == ""
     assert "eval: 33 %" in command("run", "first.yaml", "-v", "--set", "eval.trials=9").stdout
