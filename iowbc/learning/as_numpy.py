@@ -7,7 +7,7 @@ from torch import Tensor, nn
 from iowbc.arrays import Array
 from iowbc.learning.history_actor import HistoryActor
 from iowbc.learning.networks import MirroredEncoder, Normalizer, StudentNetwork, TeacherNetwork
-from iowbc.learning.perceptron import ACTIVATIONS, DenseMlp
+from iowbc.learning.perceptron import DenseMlp
 from iowbc.learning.policy import ActorCritic
 from iowbc.learning.symmetric import SymmetricHead, SymmetricMlp
 from iowbc.rollouts.policies import HistoryEncoder, HistoryPolicy, Layers, Linear, Normal, RowPolicy
@@ -40,7 +40,7 @@ def _layers(network: nn.Module) -> Layers:
         first, *others = [_linear(layer) for layer in layers]
         if network.seen is not None:
             first = Linear(_array(network.seen)[:, None] * first.weight, first.bias)
-        return Layers((first, *others), _activation(network.layers))
+        return Layers((first, *others), network.activation)
     assert isinstance(network, SymmetricMlp)
     basis = network.basis.matrix if network.seen is None else network.basis.matrix * network.seen
     even, odd = network.basis.split(basis)
@@ -55,7 +55,7 @@ def _layers(network: nn.Module) -> Layers:
             sums, differences = even @ keep.weight.T, odd @ negate.weight.T
         weight = torch.cat([sums + differences, sums - differences], dim=1)
         found.append(Linear(_array(weight), _array(torch.cat([keep.bias, keep.bias]))))
-    return Layers((*found, _head(network.last)), _name(network.layers.activation.activation.module))
+    return Layers((*found, _head(network.last)), network.activation)
 
 
 def _head(head: SymmetricHead) -> Linear:
@@ -81,7 +81,7 @@ def student_policy(network: StudentNetwork, normal: Normal | None = None) -> His
     frame, whole = own.frame[0], own.whole[0]
     assert isinstance(frame, nn.Linear)
     assert isinstance(whole, nn.Linear)
-    encoder = HistoryEncoder(_linear(frame), _linear(whole), _activation(own.frame), mirror)
+    encoder = HistoryEncoder(_linear(frame), _linear(whole), own.activation, mirror)
     if network.estimate is not None:
         head = network.estimate.head
         estimate = _head(head) if isinstance(head, SymmetricHead) else _linear(head)
@@ -95,14 +95,6 @@ def _linear(layer: nn.Linear) -> Linear:
 def _normal(normalizer: Normalizer, size: int | None = None) -> Normal:
     """Input normalization; `size`: number of leading entries to keep."""
     return Normal(_array(normalizer.mean[:size]), _array(normalizer.std[:size]), normalizer.clip)
-
-
-def _activation(layers: nn.Sequential) -> str:
-    return _name(type(layers[1])) if len(layers) > 1 else "elu"
-
-
-def _name(module: type[nn.Module]) -> str:
-    return next(name for name, activation in ACTIVATIONS.items() if activation.module is module)
 
 
 def _array(values: Tensor | None) -> Array:

@@ -94,7 +94,7 @@ class MlpEncoder(nn.Module):
 
     def __init__(self, observation: int, history: int, features: int, latent: int, activation: str) -> None:
         super().__init__()
-        activate = ACTIVATIONS[activation].module
+        self.activation, activate = activation, ACTIVATIONS[activation].module
         self.frame = nn.Sequential(nn.Linear(observation, features), activate())
         self.whole = nn.Sequential(nn.Linear(history * features, latent), activate())
 

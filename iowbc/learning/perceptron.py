@@ -89,6 +89,7 @@ class DenseMlp(VectorPerceptron):
 
     def __init__(self, inputs: int, hidden: Sequence[int], outputs: int, activation: str) -> None:
         super().__init__()
+        self.activation = activation
         layers = nn.Sequential()
         for before, units in itertools.pairwise([inputs, *hidden]):
             layers.extend([nn.Linear(before, units), ACTIVATIONS[activation].module()])

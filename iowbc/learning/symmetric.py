@@ -156,7 +156,7 @@ class SymmetricMlp(VectorPerceptron):
 
     def __init__(self, inputs: MirrorMap, hidden: Sequence[int], outputs: MirrorMap, activation: str) -> None:
         super().__init__()
-        self.basis = MirrorBasis(inputs)
+        self.activation, self.basis = activation, MirrorBasis(inputs)
         self.layers = SymmetricLayers(self.basis.even, self.basis.odd, hidden, activation)
         self.last = SymmetricHead(hidden[-1], outputs)
 
