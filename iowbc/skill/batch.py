@@ -125,8 +125,8 @@ class GameBatch:
         memory, guidance = lower.memory, lower.guidance
         target = guidance.references.wrist_target(memory.posture, memory.command, guidance.grasp)
         self._wrist_error = wrists - target
-        happened, late = (lower.fallen, lower.dropped, lower.diverged), self._decisions >= self._limit[self.drawn.task]
-        end = ending(self._skill, self.now, held=held, happened=happened, late=late)
+        late = self._decisions >= self._limit[self.drawn.task]
+        end = ending(self._skill, self.now, held=held, happened=lower.happened, late=late)
         touched = self._in_wall()
         before, self._potential = self._potential, potential(self._skill, self.now, held)
         gained, costs = self._potential - before, self._costs * lower.period

@@ -61,8 +61,8 @@ class LowerLayer(Batch):
         self.simulation.partner.steered[:] = True
         self.moved: Motion
         """The motion after the last control step."""
-        self.fallen, self.dropped, self.diverged = np.zeros((3, self.n), np.bool_)
-        """Events since the episode began, (n,)."""
+        self.happened = np.zeros((3, self.n), np.bool_)
+        """Falls, drops and divergence since the episode began, (3, n)."""
         self.human = np.zeros((self.n, 4))
         """Intentions of humans, start frame, (n, 4): handle's velocity [m/s], object's yaw rate [rad/s], height [m]."""
         self._student, self._block = student.policy, block
@@ -74,8 +74,7 @@ class LowerLayer(Batch):
         self.moved = self.begin(which)
         self._observe(self.moved, which)
         self._starts[which] = True
-        for happened in (self.fallen, self.dropped, self.diverged):
-            happened[which] = False
+        self.happened[:, which] = False
 
     def control(self) -> None:
         rows = self.buffers["observation"][:, : self._history.frames.shape[2]]
@@ -93,7 +92,5 @@ class LowerLayer(Batch):
     def finish(self, judgement: Judgement) -> None:
         """Records falls, drops and divergence; the game decides when episodes end."""
         self.moved, ending = judgement.motion, judgement.ending
-        self.fallen |= ending.fallen
-        self.dropped |= ending.dropped
-        self.diverged |= ending.diverged
+        self.happened |= np.stack([ending.fallen, ending.dropped, ending.diverged])
         self._observe(self.moved)

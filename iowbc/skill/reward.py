@@ -31,8 +31,9 @@ class GameEnding:
         return self.success | self.failed | self.diverged
 
 
-def ending(skill: Skill, now: GameState, *, held: Mask, happened: tuple[Mask, Mask, Mask], late: Mask) -> GameEnding:
-    """Endings, (n,) each. `held`: object in the hands; `happened`: falls, drops, divergence; `late`: past the limit."""
+def ending(skill: Skill, now: GameState, *, held: Mask, happened: Mask, late: Mask) -> GameEnding:
+    """Endings, (n,) each. `held`: object in the hands; `happened` (3, n): falls, drops, divergence; `late`: past the
+    limit."""
     finish = skill.finish
     fallen, dropped, diverged = happened
     reached = (now.left < finish.distance) & (np.abs(now.lateral) < finish.lateral)

@@ -32,33 +32,27 @@ class GameState:
     path: Indices
     """Numbers of the paths, (n,)."""
     position: Array
-    """Object's centre, (n, 3) [m]."""
-    velocity: Array
-    """Object's centre, (n, 3) [m/s]."""
+    """Object's centre."""
     yaw: Array
-    """Yaw of the object, (n,) [rad]."""
     yaw_rate: Array
-    """Yaw rate of the object, (n,) [rad/s]."""
     tilt: Array
-    """Tilt of the object from upright, (n,) [rad]."""
+    """Of the object; the tilt from upright."""
     handle: Array
-    """Far handle, (n, 3) [m]."""
     handle_velocity: Array
-    """(n, 3) [m/s]."""
+    """Far handle."""
     heading: Array
-    """Heading of the robot, (n,) [rad]."""
+    """Heading of the robot."""
     base: Array
-    """Pelvis, (n, 3) [m]."""
+    """Pelvis."""
     covered: Array
-    """Arc length that the object has covered, (n,) [m]."""
+    """Arc length that the object has covered."""
     lateral: Array
-    """Distance of the object from its path, positive to the left, (n,) [m]."""
+    """Distance of the object from its path, positive to the left."""
     yaw_error: Array
-    """Yaw of the object less the path's heading, (n,) [rad]."""
     height_error: Array
-    """Height of the object less the path's, (n,) [m]."""
+    """Yaw and height of the object less the path's heading and height."""
     left: Array
-    """Remaining arc length, (n,) [m]."""
+    """Remaining arc length."""
 
 
 def situation(
@@ -73,7 +67,6 @@ def situation(
     return GameState(
         path=path,
         position=position,
-        velocity=origin.turned(state.object_linear_velocity),
         yaw=yaw,
         yaw_rate=state.object_angular_velocity[:, 2].copy(),
         tilt=np.arccos(up[:, 2].clip(-1.0, 1.0)),

@@ -26,7 +26,7 @@ def judged(now: GameState, **happened: object) -> GameEnding:
         SKILL,
         now,
         held=np.broadcast_to(happened.get("held", True), N),
-        happened=(flags["fallen"], flags["dropped"], flags["diverged"]),
+        happened=np.stack([flags["fallen"], flags["dropped"], flags["diverged"]]),
         late=np.broadcast_to(happened.get("late", False), N),
     )
 
