@@ -12,10 +12,7 @@ X, Y = 0, 1
 
 
 def arm_chains(robot: Robot) -> tuple[list[tuple[Body, ...]], tuple[Body, ...]]:
-    """Bodies of both arms from the torso outward, and those from the base to the torso.
-
-    If the torso is fixed to another body, the frame is that of the body that moves.
-    """
+    """Bodies of both arms from the torso outward, and those from the base to the torso, or the body that moves it."""
     torso = robot.tree.mover(robot.torso).name
     return [robot.tree.chain(body, torso) for body in robot.wrist_bodies], robot.tree.chain(torso, robot.base)
 
@@ -48,8 +45,7 @@ class ArmKinematics(Constants):
         self._identity = np.eye(3)[:, :, None, None]
 
     def forward(self, arm_position: Array, frames: Frames | None = None) -> tuple[Array, Array]:
-        """Wrist positions (n, 2, 3) [m] in the torso frame, their Jacobian (n, 2, 3, joints of one); `frames` of
-        `arm_position`, where they are known."""
+        """Wrists (n, 2, 3) [m] in the torso frame, and their Jacobian (n, 2, 3, joints of one); `frames` if known."""
         wrist, columns = self._reached(frames or self.frames(arm_position))
         xp = namespace(wrist)
         return xp.moveaxis(wrist, (0, 1, 2), (2, 1, 0)), xp.moveaxis(columns, (0, 1, 2, 3), (2, 3, 1, 0))
@@ -66,8 +62,7 @@ class ArmKinematics(Constants):
     def solve_step(self, arm_position: Array, target: Array, dt: float, frames: Frames | None = None) -> Array:
         """One step of differential IK (paper eq. 3), damped, with the redundancy drawn to the rest posture.
 
-        `arm_position` (n, arm joints) [rad]; `target` wrist positions (n, 2, 3) [m] in the torso frame; `dt` [s];
-        `frames` at `arm_position`, where they are known.
+        `arm_position` (n, arm joints) [rad]; `target` wrists (n, 2, 3) [m], torso frame; `dt` [s]; `frames` if known.
         next = q + J⁺e + (1 - J⁺J) k (rest - q) dt with J⁺ = Jᵀ(JJᵀ + λ² + ρ|e|)⁻¹ and e = x - FK(q), limited in
         length; the result is clipped to joint ranges and joint speed.
         """

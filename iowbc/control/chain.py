@@ -1,8 +1,7 @@
 """Chains of hinges, many rows at once: where each hinge is, from the base outward.
 
 Components come first and rows last, so that NumPy's loops are long. Written here: pinocchio and MuJoCo take one posture
-at a time and are not on the robot's computer, and the same code is traced into the exported graph. A test has an
-example worked out by hand, a forearm that hangs from an elbow (`tests/control/test_chain.py`).
+at a time and are not on the robot's computer, and the same code is traced into the exported graph.
 """
 
 from collections.abc import Sequence
@@ -108,10 +107,8 @@ class Chain(Constants):
 
 def _links(chain: Sequence[Body]) -> list[tuple[Array, Array, Array]]:
     """Of each hinge its axis, (3,), its position in the frame of the hinge before, (3,) [m], and matrices A, B, C,
-    (3, 3, 3): after the hinge the body is turned by A + B cos θ + C sin θ (Rodrigues).
-
-    Raises ValueError where the last body has no hinge.
-    """
+    (3, 3, 3): after the hinge the body is turned by A + B cos θ + C sin θ (Rodrigues). Raises ValueError where the last
+    body has no hinge."""
     if chain and chain[-1].hinge is None:
         raise ValueError(f"body {chain[-1].name!r} ends a joint chain but has no hinge; take the body it is fixed to")
     links, position, rotation = [], np.zeros(3), np.eye(3)

@@ -80,9 +80,8 @@ def build_map(
 ) -> FeasibleMap:
     """The map from a grid of feasibility flags (pitches, heights), with one run of heights at each pitch.
 
-    It grows from the `nominal` height [m] and pitch [rad] to both sides, each time into the run nearest to the nominal
-    height among those that overlap with the one before. Its bounds change with pitch by at most `slope` [m/rad]. Raises
-    ValueError when no cell is feasible.
+    It grows from the `nominal` height [m] and pitch [rad] to both sides, each time into the overlapping run nearest to
+    the nominal height. Its bounds change with pitch by at most `slope` [m/rad]. Raises ValueError for an empty map.
     """
     runs = [_runs(row) for row in feasible]
     filled = [row for row, found in enumerate(runs) if found]

@@ -15,12 +15,11 @@ from iowbc.robot.description import Robot
 
 class FootPlacement(Constants):
     """Foot placement: feet land further ahead when the robot moves faster than commanded, and further behind when it
-    is slower (Raibert's rule; the capture point of a pendulum). Holds constants only.
+    is slower (Raibert's rule; the capture point of a pendulum).
 
-    The speed is that over the standing leg, or the one that has stood longer, from joint velocities and gyroscope. The
-    offset of a swinging foot moves to that of its landing; on the ground it decays like that of a pendulum. The
-    integral of the speed error moves both feet further behind while the robot is too slow: the moment of its weight
-    about the feet pushes a crate.
+    The speed is that over the leg that has stood longer, from joint velocities and gyroscope. The offset of a swinging
+    foot moves to that of its landing; on the ground it decays like that of a pendulum. The integral of the speed error
+    moves both feet further behind while the robot is too slow: the moment of its weight about them pushes a crate.
     """
 
     def __init__(self, robot: Robot, gait: GaitPrior, placement: Placement) -> None:
@@ -30,10 +29,7 @@ class FootPlacement(Constants):
         self, foothold: Array, measured: Measured, command: Array, phase: Array, stepping: Array, period: float
     ) -> Array:
         """Forward offset of left foot, right foot and both from their places in the stride a control period [s] later,
-        (n, 3) [m].
-
-        `command` C (n, 11); `phase` (n,) of the gait; `stepping` (n,) one while the clock runs, else zero.
-        """
+        (n, 3) [m]; `command` C (n, 11); `phase` (n,) of the gait; `stepping` (n,) one while its clock runs, else 0."""
         gait, feedback = self.gait, self.placement
         foot, running = foot_phase(phase), stepping[:, None]
         standing = 1.0 * expected_stance(foot, stepping > 0.5, gait.stance)
@@ -53,7 +49,7 @@ class FootPlacement(Constants):
 
 class LegStretch(Constants):
     """Height feedback: motors yield under robot and load, and the pelvis sags below its command. Both legs stretch by
-    the integral of the error. Holds constants only."""
+    the integral of the error."""
 
     def __init__(self, robot: Robot, settings: HeightFeedback) -> None:
         self.settings, self.odometry = settings, LegOdometry(robot)
@@ -68,7 +64,7 @@ class LegStretch(Constants):
 
 class HipFeedback(Constants):
     """Torso feedback: the waist's motors yield under a load, and the torso leans further than commanded. Both hips turn
-    the pelvis back by the integral of the error. Holds constants only."""
+    the pelvis back by the integral of the error."""
 
     def __init__(self, robot: Robot, settings: TorsoFeedback) -> None:
         self.settings = settings

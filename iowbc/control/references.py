@@ -78,11 +78,8 @@ class ReferenceLayer(Constants):
         return changed
 
     def start(self, command: Array, grasp: Array) -> tuple[Array, Array]:
-        """References at the start of an episode, settled in the commanded posture, standing as the gait prior does.
-
-        command (n, 11); grasp (n, 2, 3): base grasp wrist positions, heading frame [m]; arms (n, arm joints),
-        support (n, support joints).
-        """
+        """References at the start of an episode, standing in the commanded posture: arms (n, arm joints), support (n,
+        support joints); command (n, 11); grasp (n, 2, 3): base grasp wrist positions, heading frame [m]."""
         arms = self.default_arms + 0.0 * command[:, :1]
         target = self.wrist_target(self.support(arms, command), command, grasp)
         for _ in range(self._start.settling):
@@ -153,10 +150,8 @@ class ReferenceLayer(Constants):
         return 0.0 * command[:, PITCH] if self.network is None else self.pelvis_pitch(support, command)
 
     def wrist_target(self, support: Array, command: Array, grasp: Array) -> Array:
-        """x_wrist = x_task_base + Δp (eq. 2), turned from the heading frame into the torso frame; (n, 2, 3) [m].
-
-        The torso pose is that of the references, not the measured one, so that the arms do not react to swaying.
-        """
+        """x_wrist = x_task_base + Δp (eq. 2), (n, 2, 3) [m], in the torso frame of the references, not as measured,
+        so that the arms do not react to swaying."""
         wrists = self.wrists(command, grasp)
         return self.arms.into_torso(support[:, self.waist], self.pelvis_pitch(support, command), wrists)
 

@@ -94,10 +94,8 @@ class ControlStep(Constants):
         """Shape of each part of the state, without the leading axis, in the order of the packed state."""
 
     def settle(self, heading: Array, command: Array, grasp: Array) -> State:
-        """The first state: references settled at the desired command, clamped; standing, with an empty history.
-
-        `heading` (n, 1) [rad]; `command` C (n, 11); `grasp` (n, 2, 3): base grasp of both wrists, heading frame [m].
-        """
+        """The first state: standing, references settled at the clamped command, history empty. `heading` (n, 1) [rad];
+        `command` C (n, 11); `grasp` (n, 2, 3): base grasp of both wrists, heading frame [m]."""
         command = self.references.clamp(command)
         arms, posture = self.references.start(command, grasp)
         zero = 0.0 * heading
@@ -108,9 +106,7 @@ class ControlStep(Constants):
 
     def step(self, measured: Measured, command: Array, grasp: Array, load: Array, state: State) -> StepResult:
         """One control period. `load` (n, 1): mass that the arms expect between the hands [kg]; the rest as in `settle`.
-
-        The first step after `settle` leaves command, references and gait clock as they are, and fills the history.
-        """
+        The first step after it leaves command, references and gait clock as they are, and fills the history."""
         xp, begun = namespace(command), state.begun > 0.5
         limited = self.references.clamp(approach(state.command, command, self._largest_step))
         command = xp.where(begun, limited, state.command)

@@ -3,8 +3,7 @@
 In stance a foot travels backward under the pelvis with the commanded velocity and turns against the commanded yaw rate;
 in swing it returns, lifted by the swing clearance; the pelvis sways over the standing foot. Displacements of the soles
 become joint angles by the leg's own geometry: hip pitch and knee exactly, as two links in the sagittal plane, hip roll
-and yaw and ankle roll to first order; the ankles keep the soles parallel to where the posture has them, and every joint
-stays in its range.
+and yaw and ankle roll to first order; the ankles keep the soles parallel to the posture's, and joints in their range.
 """
 
 import numpy as np
@@ -52,8 +51,7 @@ class Stride(Constants):
 
         `posture` (n, support joints): the reference at rest; `pelvis_pitch` (n,) [rad] in it; `command` C (n, 11);
         `phase` (n,) of the gait, in [0, 1); `stepping` (n,) one while the clock runs, else zero; `feedback` (n, 4 or
-        more): forward offset of left foot, right foot and both from their places in the stride, stretch of
-        both legs [m].
+        more): forward offset of left foot, right foot and both, stretch of both legs [m].
         """
         xp, legs, pitch = namespace(posture), self.legs, pelvis_pitch[:, None]
         hip, knee = posture[:, self._joints[HIP_PITCH]], posture[:, self._joints[KNEE]]
@@ -101,10 +99,8 @@ class Stride(Constants):
 
 
 def travel(foot: Array, swing: Array, stance: float) -> Array:
-    """Place of feet along their stride, 1/2 ahead to -1/2 behind, of their phases and progress in swing (n, 2).
-
-    At an even pace in stance; in swing a cubic that leaves and meets the ground at the ground's own speed.
-    """
+    """Place of feet along their stride, 1/2 ahead to -1/2 behind, of their phases and progress in swing (n, 2): at an
+    even pace in stance; in swing a cubic that leaves and meets the ground at the ground's own speed."""
     slope = (1.0 - stance) / stance
     forth = swing * swing * (3.0 - 2.0 * swing) - slope * swing * (1.0 - swing) * (1.0 - 2.0 * swing)
     return namespace(foot).where(foot < stance, 0.5 - foot / stance, forth - 0.5)
