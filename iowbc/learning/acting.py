@@ -88,10 +88,8 @@ def policy_of(network: Network, architecture: Mapping[str, Any]) -> Policy:
 
 
 def unfinished_policy(path: Path, key: str, settings: Teacher, mirrors: Mirrors) -> Policy:
-    """Policy of a training in progress, from the checkpoint at `path` or, if that is damaged, the previous one.
-
-    key: of the stage. mirrors: of a row (s_t, s_priv) and of an action. Raises `Damaged` if no checkpoint is intact.
-    """
+    """Policy of a training in progress, from its last intact checkpoint at `path`; raises `Damaged` if there is none.
+    `key`: of the stage; `mirrors`: of a row (s_t, s_priv) and of an action."""
     for candidate in (path, previous(path)):
         try:
             content = read_checked(candidate, key)

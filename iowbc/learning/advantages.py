@@ -40,9 +40,7 @@ def drawn_leaders(environments: int, group: int) -> NDArray[np.int64]:
 
 def without_common_part(advantage: Array, ended: Mask, group: int) -> Array:
     """Advantages (T, n) less the mean of the others in the group, times the coefficient of least squares of the step.
-
-    `ended`: where an episode ended with the step, (T, n); from then on an environment is on its own.
-    """
+    `ended`: where an episode ended with the step, (T, n); from then on an environment is on its own."""
     own = advantage.reshape(len(advantage), -1, group)
     together = np.ones_like(own)
     together[1:] = np.cumsum(ended, axis=0)[:-1].reshape(own[1:].shape) == 0

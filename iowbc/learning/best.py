@@ -51,7 +51,6 @@ class Best:
         return self.learner
 
     def arrays(self) -> Arrays:
-        """State for a checkpoint."""
         return {
             **prefixed("learner", self.learner),
             "score": np.array([self.score, self.caution]),
@@ -59,7 +58,6 @@ class Best:
         }
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Inverse of `arrays`."""
         self.learner = under("learner", arrays)
         self.score, self.caution = arrays["score"].tolist()
         self.rollbacks, self.low = arrays["rollbacks"].tolist()

@@ -1,8 +1,7 @@
 """Numerical precision and threads of the networks during training.
 
-Parts of a minibatch run in parallel in our own threads, which synchronize once a minibatch. Torch's threads synchronize
-in every layer and spin while they wait: with another program on one of their cores, an update of one second took two
-minutes. Results depend on the number of parts, not of threads.
+Parts of a minibatch run in our own threads, which synchronize once a minibatch. Torch's synchronize in every layer and
+spin: beside another program, an update of one second took two minutes. Results depend on the number of parts alone.
 """
 
 from collections.abc import Callable, Sequence
@@ -45,8 +44,8 @@ def reduced(precision: Precision) -> AbstractContextManager[None]:
     """Context in which layers multiply in bfloat16: if `precision` says so, or for "auto" if the processor can
     (avx512_bf16 or amx); without, it is emulated and slower.
 
-    Torch's cache of converted weights is off. All threads share it and any of them empties it; a layer used twice would
-    then sometimes sum its gradients in bfloat16.
+    Torch's cache of converted weights is off: all threads share it and any of them empties it, so that a layer used
+    twice would sometimes sum its gradients in bfloat16.
     """
     able = any(torch.cpu.get_capabilities().get(name) for name in ("avx512_bf16", "amx_bf16"))
     wanted = precision == "bfloat16" or (precision == "auto" and able)

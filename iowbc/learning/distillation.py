@@ -31,8 +31,7 @@ def spread(environments: int) -> NDArray[np.float64]:
 class ReplayBuffer:
     """Ring buffer of the newest control steps of n environments: s_t, target and age of the episode in steps.
 
-    A sample is the student's history H_t, rebuilt from the buffer, and its target: the teacher's action and any further
-    regression targets.
+    A sample is the student's history H_t, and its target: the teacher's action and any further regression targets.
     """
 
     def __init__(self, capacity: int, environments: int, observation: int, targets: int, history: int) -> None:
@@ -63,7 +62,6 @@ class ReplayBuffer:
         return frames, self.targets[times % self.steps, environments]
 
     def arrays(self) -> Arrays:
-        """State for a checkpoint."""
         return {
             "observations": self.observations,
             "targets": self.targets,
@@ -72,7 +70,6 @@ class ReplayBuffer:
         }
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Inverse of `arrays`."""
         self.observations[:] = arrays["observations"]
         self.targets[:] = arrays["targets"]
         self.ages[:] = arrays["ages"]
@@ -95,8 +92,7 @@ class DistillationLoss(nn.Module):
         action_mirror: MirrorMap,
         symmetry: Symmetry,
     ) -> None:
-        """`teacher_log_std`: not below the recipe's floor, (A,); mirrors: of the auxiliary targets (facts) and of the
-        action."""
+        """`teacher_log_std`: not below the recipe's floor, (A,); `facts_mirror`: of the auxiliary targets."""
         super().__init__()
         self.settings, self.network = settings, network
         self.register_buffer("teacher_log_std", teacher_log_std.clone())

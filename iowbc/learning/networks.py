@@ -131,13 +131,12 @@ class PrivilegedEstimate(nn.Module):
     def __init__(self, latent: int, size: int, mirror: MirrorMap | None) -> None:
         """`size`: of s_priv; `mirror`: of s_priv if mirroring swaps the halves of the latent, else None."""
         super().__init__()
-        self.symmetric = mirror is not None
         self.head = nn.Linear(latent, size) if mirror is None else SymmetricHead(latent, mirror)
         for parameter in self.head.parameters():
             nn.init.zeros_(parameter)
 
     def forward(self, latent: Tensor) -> Tensor:
-        if not self.symmetric:
+        if isinstance(self.head, nn.Linear):
             return cast(Tensor, self.head(latent))
         own, image = latent.chunk(2, dim=-1)
         return cast(Tensor, self.head(own + image, own - image))
@@ -172,11 +171,8 @@ class StudentNetwork(nn.Module):
         mirrors: Any = None,
         privileged: Any = None,
     ) -> None:
-        """`observation`: size of the visible part of s_t, which may end before the object's pose. `mirrors`: of
-        observation and action, from `mirror_as_json`; the network then commutes with them.
-
-        `privileged`: mirror of s_priv if the body receives an estimate of s_priv, otherwise None.
-        """
+        """`observation`: size of the visible part of s_t, which may end before the object's pose. `mirrors`: as in
+        `TeacherNetwork`. `privileged`: mirror of s_priv if the body receives an estimate of it, otherwise None."""
         super().__init__()
         del encoder  # named in the architectures of earlier versions, which had others, too
         self.observation = observation

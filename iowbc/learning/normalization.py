@@ -83,7 +83,6 @@ class Normalization:
         }
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Inverse of `arrays`."""
         self.discounted = np.array(arrays["discounted"])
         if "inherited" in arrays:
             mean, std = np.array(arrays["inherited"])

@@ -143,10 +143,8 @@ def acting_part(arrays: Mapping[str, NDArray[Any]]) -> Arrays:
 def trained_network(
     policy: Mapping[str, NDArray[Any]], settings: Teacher, mirrors: Mirrors
 ) -> tuple[Network, dict[str, Any]]:
-    """Network of the policy's mean action, including normalisation, and the arguments that rebuild it.
-
-    policy: parameters and buffers of an `ActorCritic`; mirrors: of a row (s_t, s_priv) and of an action.
-    """
+    """Network of the mean action of an `ActorCritic` with these parameters and buffers, including normalisation, and
+    the arguments that rebuild it. `mirrors`: of a row (s_t, s_priv) and of an action."""
     arrays = {name: torch.from_numpy(np.array(value)) for name, value in policy.items()}
     mean, std = arrays["normalizer.mean"], arrays["normalizer.std"]
     actions = len(mirrors[1])
@@ -179,9 +177,7 @@ def trained_network(
 
 def load_policy_weights(policy: ActorCritic, network: Network) -> None:
     """Load a trained network's mean action and standard deviation into a PPO policy; its value network is unchanged.
-
-    Raises RuntimeError if the networks have different architectures.
-    """
+    Raises RuntimeError if the networks have different architectures."""
     learnt = network.state_dict() if isinstance(network, StudentNetwork) else network.body.state_dict()
     actor = policy.actor.network if isinstance(policy.actor, HistoryActor) else policy.actor
     actor.load_state_dict(learnt)

@@ -41,10 +41,8 @@ FIGURES = ("policy_loss", "value_loss", "kl", "approx_kl", "clip_share")
 
 
 class Learner:
-    """PPO learner on a vector environment with raw observations and rewards. One update is `collect`, then `train`.
-
-    The initial mean action is near zero, so that the robot follows the reference.
-    """
+    """PPO learner on a vector environment with raw observations and rewards. One update is `collect`, then `train`. The
+    initial mean action is near zero, so that the robot follows the reference."""
 
     def __init__(
         self,

@@ -66,10 +66,8 @@ def _eigenvectors(mirror: MirrorMap) -> tuple[list[Any], list[Any]]:
 
 
 class PairedActivation(nn.Module):
-    """Activation of unit pairs (a, b). Inputs are (a + b) / 2 and (a - b) / 2, outputs a' + b' and a' - b'.
-
-    Mirroring swaps a and b: the first output stays, the second changes sign, whatever the activation.
-    """
+    """Activation of unit pairs (a, b). Inputs are (a + b) / 2 and (a - b) / 2, outputs a' + b' and a' - b'. Mirroring
+    swaps a and b: the first output stays, the second changes sign, whatever the activation."""
 
     def __init__(self, name: str) -> None:
         super().__init__()

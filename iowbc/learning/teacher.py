@@ -68,9 +68,7 @@ class TeacherTraining:
 
     def update(self) -> dict[str, float]:
         """One rollout with its gradient steps and, at the check interval, an evaluation; returns their statistics.
-
-        Rolls back to the best policy after a collapse. Raises StageFailed after too many rollbacks.
-        """
+        After a collapse rolls back to the best policy; raises StageFailed after too many rollbacks."""
         model, begin = self.model, time.perf_counter()
         model.seconds = dict.fromkeys(model.seconds, 0.0)
         model.caution = self.best.caution
@@ -159,10 +157,7 @@ class TeacherTraining:
 
     def begin(self, network: Network) -> None:
         """Start from a trained policy and keep its normalisation statistics fixed. An adaptive learning rate starts at
-        its minimum, since larger steps soon spoil a trained policy.
-
-        Raises StageFailed if its networks have another architecture.
-        """
+        its minimum, since larger steps soon spoil a trained policy. Raises StageFailed for another architecture."""
         model = self.model
         try:
             load_policy_weights(model.policy, network)

@@ -27,12 +27,10 @@ ACTIVATIONS: Mapping[str, Activation] = {"elu": elu, "relu": lambda x: np.maximu
 
 @dataclass(frozen=True)
 class Linear:
-    """x · weight + bias."""
+    """x · weight + bias: (inputs, outputs) and (outputs,), float32."""
 
     weight: Array
-    """(inputs, outputs), float32."""
     bias: Array
-    """(outputs,), float32."""
 
     def __call__(self, x: Array) -> Array:
         y: Array = x @ self.weight
@@ -122,10 +120,7 @@ class HistoryPolicy:
 
 
 class History:
-    """The last K observations of n environments, shape (n, K, S), oldest first.
-
-    An episode begins with K copies of its first observation.
-    """
+    """The last K observations of n environments, (n, K, S), oldest first; an episode begins with K times its first."""
 
     def __init__(self, environments: int, length: int, observation: int) -> None:
         self.frames: NDArray[np.float32] = np.zeros((environments, length, observation), np.float32)

@@ -91,11 +91,9 @@ class DaggerPolicy:
 
     @property
     def starts(self) -> Mask:
-        """See `ExploringPolicy.starts`."""
         return self.past.starts
 
     def part(self, first: int, last: int) -> Self:
-        """See `ExploringPolicy.part`."""
         own = slice(first, last)
         return replace(self, teacher_of=self.teacher_of[own], taught=self.taught[own], past=self.past.of(first, last))
 
