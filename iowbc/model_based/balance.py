@@ -57,9 +57,7 @@ class Balance:
 
     def configuration(self, gravity: Array, joints: Array) -> Array:
         """Model configuration, (22,), in a frame with the base's heading and its origin midway between the soles.
-
-        `gravity` (3,): its direction in the base frame; `joints` (15,): support joints [rad].
-        """
+        `gravity` (3,): its direction in the base frame; `joints` (15,): support joints [rad]."""
         up = -gravity / np.linalg.norm(gravity)
         forward = np.array([1.0, 0.0, 0.0]) - up[0] * up
         forward /= np.linalg.norm(forward)
@@ -140,9 +138,7 @@ class Balance:
 
     def _limits(self, q: Array, v: Array, torque: Array, bias: Array) -> tuple[Array, Array, Array]:
         """Rows and bounds: torques, also of pairs that share a linkage, joint ranges, and what the soles can carry.
-
-        At a mechanical stop, the stop's torque adds to the motor's.
-        """
+        At a mechanical stop, the stop's torque adds to the motor's."""
         nv, time, support = self.velocities, self.settings.limit_time, self.support
         angle, ahead = q[7:], q[7:] + time * v[6:]
         cone = np.concatenate([np.zeros((len(self._cone), nv)), self._cone], axis=1)

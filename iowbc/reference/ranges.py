@@ -9,8 +9,7 @@ from iowbc.recipe.generator import ReferenceGenerator
 from iowbc.robot.description import Robot
 
 LOWEST, HIGHEST = 0.3, 1.1
-"""Range of heights that may be sampled, relative to the base height with straight legs; catches wrong units and typos.
-The feasible map finds the true bounds."""
+"""Range of heights that may be sampled, relative to the base height with straight legs: catches units and typos."""
 STEEPEST = np.pi / 2
 """Largest torso pitch [rad]."""
 

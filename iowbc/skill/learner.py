@@ -24,8 +24,8 @@ IMITATION_BATCH = 1024
 class SkillTraining:
     """Training of robot and human, one update at a time; see `iowbc.stages.training`.
 
-    Both policies start with zero output: the nominal command, and a cooperative human. The human policy learns from the
-    episodes in which it acts; the others have scripted humans.
+    Both policies start with zero output: the nominal command, and a cooperative human. The human policy learns from its
+    own episodes; the others have scripted humans.
     """
 
     def __init__(self, settings: SkillLearning, game: TransportGame, seed: int) -> None:
@@ -225,8 +225,7 @@ class SkillTraining:
         return error
 
     def golden_observations(self, decisions: int) -> Array:
-        """Observations of the robots over the first decisions of the last rollout's games, with mean actions,
-        (decisions x n, k)."""
+        """Observations, (decisions x n, k), of the robots in the last rollout's first decisions, with mean actions."""
         seeds, found = self._seeds(self.steps - self.game.n * self.settings.rollout), list[Array]()
         observed = self.game.reset(seeds)
         for _ in range(decisions):

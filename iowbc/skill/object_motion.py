@@ -63,11 +63,8 @@ class NominalCommand(SkillCommand):
         self._pursuit = skill.pursuit
 
     def leading(self, wanted: ObjectMotion, now: GameState) -> Array:
-        """Commands for the desired motion of the object; the base circles the object's centre as it turns.
-
-        v_base = v_object - ω × (object - base), in the heading frame. The hands rise by the path's height plus the
-        object's height error.
-        """
+        """Commands for the desired motion of the object; the base circles the object's centre as it turns: v_base =
+        v_object - ω × (object - base), heading frame. The hands rise by the path's height plus the height error."""
         command = self.standing()
         rate = wanted.yaw_rate + self._pursuit.yaw * wrapped(wanted.heading - now.heading)
         command[:, :YAW_RATE] = turned(wanted.velocity, -now.heading)

@@ -32,8 +32,7 @@ class GameEnding:
 
 
 def ending(skill: Skill, now: GameState, *, held: Mask, happened: Mask, late: Mask) -> GameEnding:
-    """Endings, (n,) each. `held`: object in the hands; `happened` (3, n): falls, drops, divergence; `late`: past the
-    limit."""
+    """Endings. `held`: object in the hands; `happened` (3, n): falls, drops, divergence; `late`: past the limit."""
     finish = skill.finish
     fallen, dropped, diverged = happened
     reached = (now.left < finish.distance) & (np.abs(now.lateral) < finish.lateral)

@@ -50,9 +50,7 @@ def fit(
     interrupted: Callable[[], bool],
 ) -> Fitted:
     """Trains with Adam on |δθ|² + w |J δθ|², lengths in units of `length_scale`; keeps the epoch that validates best.
-
-    One thread and one seeded generator: the result is the same on every run.
-    """
+    One thread and one seeded generator: the result is the same on every run."""
     torch.set_num_threads(1)
     generator = torch.Generator().manual_seed(seed)
     input_mean, input_std = _moments(train.inputs)

@@ -21,9 +21,8 @@ class TaskErrors:
     """Errors of postures that stand on both soles, the soles fitted together to their places, (n,) [m, rad]."""
 
     height: Array
-    """Height reached minus commanded, shape (n,) [m]."""
     pitch: Array
-    """Torso pitch reached minus commanded, shape (n,) [rad]."""
+    """Height and torso pitch reached minus commanded."""
     foot: Array
     """Distance of each sole centre from its place, shape (n,) [m]."""
     foot_rotation: Array
@@ -66,10 +65,8 @@ class TaskKinematics:
         return reached - sample.height, pinocchio.log3(turned)[1], foot, foot_rotation, margin
 
     def jacobian(self, sample: Sample, configuration: Array) -> Array:
-        """Derivative of foot position and rotation, height and torso rotation by the support joints, shape (10, 15).
-
-        `configuration` (22,) stands on the ground; the base follows so that the soles stay fitted to their places.
-        """
+        """Derivative of foot position and rotation, height and torso rotation by the support joints, (10, 15), where
+        `configuration` (22,) stands on the ground; the base follows so that the soles stay fitted to their places."""
         support = self.support
         model, data = support.model, support.data
         support.lock(sample)

@@ -22,10 +22,8 @@ SOLVED = 1
 def constrained_step(
     gradient: Array, residual: Array, equality: Array, error: Array, rows: Array, lower: Array, upper: Array
 ) -> Array:
-    """argmin ½|G s + r|² with E s = -e and lower ≤ R s ≤ upper, shape (n,). Raises `Rejected` where there is none.
-
-    An orthogonal decomposition of Eᵀ eliminates the equalities and leaves a small dense QP.
-    """
+    """argmin ½|G s + r|² with E s = -e and lower ≤ R s ≤ upper, (n,). An orthogonal decomposition of Eᵀ eliminates the
+    equalities and leaves a small dense QP. Raises `Rejected` where there is none."""
     count = len(error)
     orthogonal, triangle = np.linalg.qr(equality.T, mode="complete")
     particular = orthogonal[:, :count] @ np.linalg.solve(triangle[:count].T, -error)
@@ -87,11 +85,8 @@ def cost_weights(support: SupportModel) -> tuple[Array, Array]:
 
 def kinematic_start(support: SupportModel, sample: Sample) -> Array:
     """Configuration (22,) with the feet in place, the centre of mass over their middle, height and torso as commanded,
-    near the default posture. The support model must be locked to the sample.
-
-    Gauss-Newton steps on the cost without torques, with the feet as linearised equalities and the joint ranges. Raises
-    `Rejected` where the feet cannot stay in place.
-    """
+    near the default posture, by Gauss-Newton steps on the cost without torques, with the feet as linearised equalities
+    and the joint ranges. The support model must be locked to the sample. Raises `Rejected` if the feet cannot stay."""
     problem, weight = support.problem, np.concatenate(cost_weights(support))
     q, largest = support.rest(sample), problem.largest_step
     rest = q[7:].copy()

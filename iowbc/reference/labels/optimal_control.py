@@ -1,8 +1,7 @@
 """Multi-contact optimal control problem over a horizon (paper eq. 4), with the arms locked, solved by BoxFDDP.
 
 Full dynamics and both feet in contact. The robot starts at rest in a posture that meets the command by kinematics, and
-settles into the one of least cost. The label is a node before the end of the horizon, where neither start nor end have
-an influence.
+settles into that of least cost. The label is a node before the end, where neither start nor end have an influence.
 """
 
 from typing import Any
@@ -121,10 +120,8 @@ class OptimalControlMethod:
 
 
 def distribute(support: SupportModel, configuration: Array, limits: SoleLimits) -> Array:
-    """The sole wrenches that hold a posture with the least joint torques, (2, 6), in the soles' frames.
-
-    `configuration` (22,) of the support model. Raises `Rejected` where the limits leave no equilibrium with gravity.
-    """
+    """The sole wrenches that hold a `configuration` (22,) with the least joint torques, (2, 6), in the soles' frames.
+    Raises `Rejected` where the limits leave no equilibrium with gravity."""
     model, data = support.model, support.data
     gravity = pinocchio.computeGeneralizedGravity(model, data, configuration).copy()
     pinocchio.computeJointJacobians(model, data, configuration)

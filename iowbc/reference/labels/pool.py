@@ -67,12 +67,10 @@ def label_all(
     progress: Callable[[int, int], None] = lambda done, total: None,
     elsewhere: Callable[[list[list[int]]], Iterator[tuple[int, bytes]]] | None = None,
 ) -> Shard:
-    """Labels the samples with these numbers. The result does not depend on the number of workers. `elsewhere`: first
-    makes the missing shards of these chunks on other machines, and yields the place and the file content of each.
-
-    Shards in `folder` that belong to `key` are reused, others recomputed. Raises `Interrupted` when `interrupted()`
-    turns true, WorkerFailed when a worker fails in Python or cannot start, or when too many are killed.
-    """
+    """Labels the samples with these numbers. The result does not depend on the number of workers. Shards in `folder`
+    that belong to `key` are reused, others recomputed. `elsewhere`: first makes the missing shards of these chunks on
+    other machines, and yields the place and the file content of each. Raises `Interrupted` when `interrupted()` turns
+    true, WorkerFailed when a worker fails in Python or cannot start, or when too many are killed."""
     folder.mkdir(parents=True, exist_ok=True)
     chunks, paths = cut(indices, chunk_size, folder)
     done = {number: shard for number, path in enumerate(paths) if (shard := read_shard(path, key, chunks[number]))}

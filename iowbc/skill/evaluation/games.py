@@ -69,11 +69,9 @@ def play_batches(
     work: Path,
     interrupted: Callable[[], bool],
 ) -> Iterator[pd.DataFrame]:
-    """Rows of a competitor's episodes, batch by batch; finished batches are kept in `work`.
-
-    `human`: the learnt one; `controller`: the world and student below the competitor; `workers`: see `TransportGame`.
-    Raises Interrupted, and StageFailed if the competitor observes another number of values than the games show.
-    """
+    """Rows of a competitor's episodes, batch by batch; finished batches are kept in `work`. `human`: the learnt one;
+    `controller`: the world and student below the competitor; `workers`: see `TransportGame`. Raises Interrupted, and
+    StageFailed if the competitor observes another number of values than the games show."""
     for begin in range(0, len(planned), settings.games):
         batch = planned[begin : begin + settings.games]
         place = f"{competitor.label} {competitor.training} {begin} {len(batch)}"
@@ -103,10 +101,8 @@ def play_batches(
 
 def on_controller(world: Specification, label: str, own: Task, student: Student, rg: Path | None) -> Specification:
     """Specification of the same games with another controller. `label`: its name in `skill.eval.controllers`; `own`:
-    the task for which its `student` was trained; `rg`: folder of its reference generator.
-
-    Raises StageFailed if the controller has no grasp for a scene of the games, or observes more than they provide.
-    """
+    the task for which its `student` was trained; `rg`: folder of its reference generator. Raises StageFailed if the
+    controller has no grasp for a scene of the games, or observes more than they provide."""
     where, recipe = f"skill.eval.controllers.{label}", world.recipe
     shown = observation_layout(load_robot(world.robot), recipe.task.observation.observe_object).size
     if student.observation > shown:
