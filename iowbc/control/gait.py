@@ -36,11 +36,8 @@ def foot_phase(phase: Array) -> Array:
 
 
 def advance(phase: Array, stepping: Mask, moving: Mask, gait: GaitPrior, dt: float) -> tuple[Array, Mask]:
-    """One control step of the clock: new phase (n,) and whether it runs (n,).
-
-    It starts when the command asks for motion. When the command stops, it runs on to the next moment at which both feet
-    are down, phase 0 or 0.5, and rests there.
-    """
+    """One control step of the clock: new phase (n,) and whether it runs (n,). It starts when the command asks for
+    motion. When that stops, it runs on until both feet are down, at phase 0 or 0.5, and rests there."""
     xp, advanced = namespace(phase), phase + gait.frequency * dt
     halves = xp.floor(phase * 2.0 + TINY)
     arrived = xp.floor(advanced * 2.0 + TINY) > halves

@@ -22,7 +22,6 @@ def acting_policy(policy: ActorCritic) -> RowPolicy | HistoryPolicy:
 
 
 def numpy_policy(network: TeacherNetwork | StudentNetwork) -> RowPolicy | HistoryPolicy:
-    """NumPy policy of a teacher or a student."""
     if isinstance(network, StudentNetwork):
         return student_policy(network)
     return RowPolicy(_normal(network.normalizer), _layers(network.body))

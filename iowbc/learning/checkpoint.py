@@ -42,23 +42,21 @@ def under(prefix: str, arrays: Mapping[str, NDArray[Any]]) -> Arrays:
 
 
 def module_arrays(module: nn.Module) -> Arrays:
-    """Parameters and buffers of a network."""
+    """Parameters and buffers of a network; inverse of `restore_module`."""
     return {name: value.detach().cpu().numpy().copy() for name, value in module.state_dict().items()}
 
 
 def restore_module(module: nn.Module, arrays: Mapping[str, NDArray[Any]]) -> None:
-    """Inverse of `module_arrays`."""
     module.load_state_dict({name: torch.from_numpy(np.array(value)) for name, value in arrays.items()})
 
 
 def optimizer_arrays(optimizer: torch.optim.Optimizer) -> Arrays:
-    """The moments of an optimiser, by parameter number; its settings come from the recipe."""
+    """The moments of an optimiser, by parameter number, for `restore_optimizer`; its settings come from the recipe."""
     moments = optimizer.state_dict()["state"]
     return {f"{i}.{name}": value.cpu().numpy().copy() for i, entry in moments.items() for name, value in entry.items()}
 
 
 def restore_optimizer(optimizer: torch.optim.Optimizer, arrays: Mapping[str, NDArray[Any]]) -> None:
-    """Inverse of `optimizer_arrays`."""
     moments: dict[int, dict[str, torch.Tensor]] = {}
     for name, value in arrays.items():
         number, field = name.split(".", 1)

@@ -38,7 +38,7 @@ class HistoryEnvironments(VecEnvWrapper):  # type: ignore[misc]
         return self._rows(row, dones), rewards, dones, infos
 
     def roll(self, rollout_policy: ExploringPolicy, steps: int) -> Trajectories:
-        """See `Environments`; policy and returned trajectories use rows with histories."""
+        """Make a rollout of `steps` control steps; policy and returned trajectories use rows with histories."""
         before = np.roll(self._history.frames, 1, axis=1)  # the policy appends the newest observation itself
         past = Past(before, np.zeros(self.num_envs, np.bool_))
         found: Trajectories = self.venv.roll(replace(rollout_policy, past=past), steps)
@@ -64,17 +64,14 @@ class HistoryEnvironments(VecEnvWrapper):  # type: ignore[misc]
         return np.concatenate([frames.reshape(len(row), -1), row[:, self._size :]], axis=1)
 
     def copy(self, source: NDArray[np.int64]) -> NDArray[np.float32]:
-        """See `Environments`."""
         self._history.frames[:] = self._history.frames[source]
         return self._beside(self._history.frames, self.venv.copy(source))
 
     def state(self) -> dict[str, NDArray[Any]]:
-        """Complete state, for a checkpoint."""
         own: dict[str, NDArray[Any]] = self.venv.state()
         return own | {"history": self._history.frames.copy()}
 
     def restore(self, state: Mapping[str, NDArray[Any]]) -> None:
-        """Inverse of `state`."""
         own = dict(state)
         self._history.frames[:] = own.pop("history")
         self.venv.restore(own)

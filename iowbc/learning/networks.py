@@ -35,7 +35,6 @@ def mirrors_as_json(mirrors: Mirrors, symmetry: str) -> Any:
 
 
 def mirror_from_json(plain: Any) -> MirrorMap:
-    """Inverse of `mirror_as_json`."""
     return MirrorMap(np.array(plain["permutation"], np.int64), np.array(plain["sign"], np.float32))
 
 
@@ -203,7 +202,6 @@ class StudentNetwork(nn.Module):
         return normal[:, -1], self.encoder(normal)
 
     def act(self, newest: Tensor, latent: Tensor) -> Tensor:
-        """The mean action."""
         return cast(Tensor, self.body(torch.cat([newest, self.body_context(latent)], dim=1)))
 
     def body_context(self, latent: Tensor) -> Tensor:

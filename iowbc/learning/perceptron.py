@@ -32,10 +32,8 @@ ACTIVATIONS = {
 
 
 class Perceptron(nn.Module, ABC):
-    """(..., inputs) to (..., outputs): `prepare`, then `hidden`, then `head`.
-
-    A learner prepares a sample once and uses it many times; it may compute `hidden` in reduced precision.
-    """
+    """(..., inputs) to (..., outputs): `prepare`, then `hidden`, then `head`. A learner prepares a sample once and uses
+    it many times; it may compute `hidden` in reduced precision."""
 
     def prepare(self, x: Tensor) -> Tensor:
         """Input of the first layer, in the shape of `x`."""

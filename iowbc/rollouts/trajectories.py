@@ -30,9 +30,8 @@ class Trajectories:
     observation: Array
     """Rows before each step and after the last one, (T + 1, n, S)."""
     action: Array
-    """(T, n, A)."""
     reward: Array
-    """(T, n)."""
+    """(T, n, A) and (T, n)."""
     ended: Mask
     """True where an episode ended with the step, (T, n)."""
     cut: Array

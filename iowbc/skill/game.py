@@ -47,14 +47,12 @@ class GameOutcome:
     reward: Array
     """Shared by both agents, (n,) float32."""
     terminated: Mask
-    """(n,)."""
     truncated: Mask
-    """Ended by the time limit, (n,)."""
+    """Ended by success, failure or divergence; by the time limit, (n,)."""
     final: Observed
     """Before ended episodes have restarted."""
     figures: Mapping[str, Array]
-    """Metrics of the k episodes that ended, in the order of the games, by name, (k,); see
-    `iowbc.skill.figures.FIGURES`. Task and partner are names."""
+    """Metrics `FIGURES` of the k episodes that ended, in the order of the games, (k,); task and partner are names."""
 
 
 class TransportGame:

@@ -82,5 +82,4 @@ class GameSetup:
         }
 
     def batch(self, first: int, last: int, buffers: Buffers) -> GameBatch:
-        """The games from `first` to `last` (excluded)."""
         return GameBatch(self, first, last, buffers)

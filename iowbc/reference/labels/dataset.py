@@ -37,11 +37,9 @@ class Dataset:
     reached: Array
     """Height reached, shape (n,) [m]."""
     rejected_command: Array
-    """Height [m] and torso pitch [rad] of samples without a label, shape (r, 2)."""
     rejected_index: Array
-    """Sample numbers of the rejected samples, shape (r,)."""
     rejected_reason: Array
-    """Reasons for rejection, shape (r,), text."""
+    """Of samples without a label: command, shape (r, 2) [m, rad], number, shape (r,), and reason, shape (r,), text."""
 
     def __len__(self) -> int:
         return len(self.index)
