@@ -107,8 +107,7 @@ class Chain(Constants):
 
 def _links(chain: Sequence[Body]) -> list[tuple[Array, Array, Array]]:
     """Of each hinge its axis, (3,), its position in the frame of the hinge before, (3,) [m], and matrices A, B, C,
-    (3, 3, 3): after the hinge the body is turned by A + B cos θ + C sin θ (Rodrigues). Raises ValueError where the last
-    body has no hinge."""
+    (3, 3, 3): it turns the body by A + B cos θ + C sin θ (Rodrigues). Raises ValueError if the last body has none."""
     if chain and chain[-1].hinge is None:
         raise ValueError(f"body {chain[-1].name!r} ends a joint chain but has no hinge; take the body it is fixed to")
     links, position, rotation = [], np.zeros(3), np.eye(3)

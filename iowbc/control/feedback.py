@@ -48,8 +48,7 @@ class FootPlacement(Constants):
 
 
 class LegStretch(Constants):
-    """Height feedback: motors yield under robot and load, and the pelvis sags below its command. Both legs stretch by
-    the integral of the error."""
+    """Height feedback: motors yield under load, and the pelvis sags; both legs stretch by the integral of the error."""
 
     def __init__(self, robot: Robot, settings: HeightFeedback) -> None:
         self.settings, self.odometry = settings, LegOdometry(robot)

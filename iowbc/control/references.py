@@ -36,8 +36,7 @@ class ReferenceLayer(Constants):
     """Arm and support references of n environments. Holds constants only; the caller keeps the references."""
 
     def __init__(self, robot: Robot, references: References, rg: Path | None) -> None:
-        """`rg`: folder of the fitted reference generator; without one θ_S_ref is the default posture, and commands are
-        not clamped to a feasible map."""
+        """`rg`: folder of the generator; without it θ_S_ref is the default posture, and commands are not clamped."""
         self.arms = ArmKinematics(robot, references.arms)
         self.network, self.feasible = None, None
         if rg is not None:

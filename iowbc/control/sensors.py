@@ -22,9 +22,8 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Measured:
-    """Sensor measurements of n robots, one row each: vectors (n, 3), `heading` (n, 1), joints (n, joints), and a
-    quaternion (n, 4). `heading` may drift slowly; an object's are needed where the policy observes it, its position
-    being zero without one."""
+    """Sensor measurements of n robots: vectors (n, 3), `heading` (n, 1), joints (n, joints), a quaternion (n, 4).
+    `heading` may drift slowly; an object's are needed where the policy observes it, its position zero without one."""
 
     projected_gravity: Annotated[
         Array, Quantity(polar_vector, "1", "base", "direction of gravity; (0, 0, -1) when upright")

@@ -88,8 +88,7 @@ class TeacherNetwork(nn.Module):
 
 
 class MlpEncoder(nn.Module):
-    """Normalised history, (n, K, S), oldest first, to latent, (n, latent): one layer shared by all observations, then
-    one layer on all their features."""
+    """Normalised history, (n, K, S), to latent, (n, latent), as by `iowbc.rollouts.policies.HistoryEncoder`."""
 
     def __init__(self, observation: int, history: int, features: int, latent: int, activation: str) -> None:
         super().__init__()

@@ -66,8 +66,7 @@ class VectorPerceptron(Perceptron):
         self.register_buffer("seen", None, persistent=False)
 
     def hide(self, inputs: Sequence[int]) -> None:
-        """Mask these inputs from now on and set their weights to zero. Raises ValueError if an input cannot be masked
-        without another."""
+        """Mask these inputs and set their weights to zero. Raises ValueError if one cannot be masked alone."""
         self.seen, weights = self._without(inputs)
         with torch.no_grad():
             for weight, seen in weights:

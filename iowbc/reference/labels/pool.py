@@ -1,7 +1,6 @@
 """Labels samples in worker processes, in shards on disk; a native crash of a solver costs one sample.
 
-A dying worker rejects its sample only if the solver crashed. After a kill from outside the sample is retried, so that
-the dataset does not depend on it.
+A sample is rejected only if its solver crashed. After a kill from outside, on which no label may depend, it is retried.
 """
 
 import multiprocessing

@@ -166,8 +166,7 @@ def histogram(
     counted: str = "samples",
     everything: bool = False,
 ) -> None:
-    """Histogram of values times `factor`, with a limit and its meaning as a dashed line; without `everything` it gives
-    the number of values beyond the axis."""
+    """Histogram of values times `factor`, with a dashed limit; without `everything` it counts those beyond the axis."""
     values = factor * values
     low, high = float(values.min()), float(values.max() if everything else np.percentile(values, SHOWN))
     if limit is not None:
