@@ -77,17 +77,15 @@ def student_policy(network: StudentNetwork, normal: Normal | None = None) -> His
     if isinstance(own, MirroredEncoder):
         mirror = own.permutation.numpy(), own.sign.numpy()
         own = own.encoder
-    frame, whole = own.frame[0], own.whole[0]
-    assert isinstance(frame, nn.Linear)
-    assert isinstance(whole, nn.Linear)
-    encoder = HistoryEncoder(_linear(frame), _linear(whole), own.activation, mirror)
+    encoder = HistoryEncoder(_linear(own.frame[0]), _linear(own.whole[0]), own.activation, mirror)
     if network.estimate is not None:
         head = network.estimate.head
         estimate = _head(head) if isinstance(head, SymmetricHead) else _linear(head)
     return HistoryPolicy(normal or _normal(network.normalizer), encoder, estimate, _layers(network.body))
 
 
-def _linear(layer: nn.Linear) -> Linear:
+def _linear(layer: nn.Module) -> Linear:
+    assert isinstance(layer, nn.Linear)
     return Linear(_array(layer.weight.T), _array(layer.bias))
 
 
@@ -96,6 +94,5 @@ def _normal(normalizer: Normalizer, size: int | None = None) -> Normal:
     return Normal(_array(normalizer.mean[:size]), _array(normalizer.std[:size]), normalizer.clip)
 
 
-def _array(values: Tensor | None) -> Array:
-    assert values is not None
+def _array(values: Tensor) -> Array:
     return np.array(values.detach().numpy(), order="C")

@@ -19,11 +19,9 @@ Symmetry = Literal["construction", "none"]
 
 
 def spread(environments: int) -> NDArray[np.float64]:
-    """Low-discrepancy numbers in [0, 1), shape (n,): multiples of the golden ratio, modulo 1.
-
-    The teacher controls the environments whose number is below its share. Neighbouring environments have the same
-    scene, and any run of neighbours covers [0, 1) evenly; so the teacher's share is the same in every scene.
-    """
+    """Low-discrepancy numbers in [0, 1), shape (n,): multiples of the golden ratio, modulo 1. The teacher controls the
+    environments whose number is below its share. It is the same in every scene: neighbours have one scene, and any run
+    of them covers [0, 1) evenly."""
     golden = (math.sqrt(5.0) - 1.0) / 2.0
     return np.array([index * golden % 1.0 for index in range(environments)])
 

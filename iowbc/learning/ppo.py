@@ -239,8 +239,7 @@ class Learner:
         return self.steps > self.value_alone
 
     def _gradient_step(self, batch: Tensor, before: Tensor) -> Tensor:
-        """One step of the optimiser on a minibatch of rows, within the bounds of the standard deviation; returns
-        `FIGURES`. `before`: log std before the update."""
+        """One optimiser step on a minibatch of rows, in the bounds of the std; returns `FIGURES`. `before`: log std."""
         policy, size = self.policy, len(batch)
         parameters = [*policy.actor.parameters(), *policy.critic.parameters(), policy.log_stds]
         advantage = self.samples.named(batch)["advantage"]

@@ -1,7 +1,4 @@
-"""Policies in NumPy and the observation history H_t = {s_{t-k}, ..., s_t} that some receive.
-
-They compute mean actions of stacked rows, as fast as torch, without its memory use in every worker.
-"""
+"""Mean actions of policies in NumPy, as fast as torch without its memory use in every worker, and the history H_t."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
