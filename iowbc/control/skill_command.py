@@ -20,8 +20,10 @@ class SkillCommand:
         if robot.push_height is not None:
             self._still[pushing, HEIGHT] = robot.push_height
         self._scale = np.array([*robot.velocity, robot.yaw_rate, robot.height, robot.pitch, *[robot.offset] * 6])
-        ahead = np.where(pushing[:, None, None], _ranges(commands.pushing), _ranges(commands))
-        self._low, self._high = ahead[:, 0], ahead[:, 1]
+        axes = ("velocity_x", "velocity_y", "yaw_rate")
+        level, push = (np.array([getattr(own, name) for name in axes]).T for own in (commands, commands.pushing))
+        ranges = np.where(pushing[:, None, None], push, level)
+        self._low, self._high = ranges[:, 0], ranges[:, 1]
 
     def standing(self) -> Array:
         return self._still.copy()
@@ -53,8 +55,3 @@ class SkillCommand:
     def action_of(self, command: Array, nominal: Array) -> Array:
         """The action that moves a nominal command to another, (n, 11) in [-1, 1]."""
         return ((command - nominal) / self._scale).clip(-1.0, 1.0)
-
-
-def _ranges(ranges: object) -> Array:
-    """Lower and upper ends of the velocities, (2, 3)."""
-    return np.array([getattr(ranges, name) for name in ("velocity_x", "velocity_y", "yaw_rate")]).T

@@ -60,7 +60,6 @@ class StudentPolicy:
         self.starts |= which
 
     def act(self, observation: NDArray[np.float32], privileged: NDArray[np.float32]) -> NDArray[np.float32]:
-        del privileged
         if self.history is None:
             self.history = History(len(observation), self.length, self.network.observation)
             self.starts = np.ones(len(observation), np.bool_)

@@ -68,10 +68,8 @@ class HistoryEnvironments(VecEnvWrapper):  # type: ignore[misc]
         return self._beside(self._history.frames, self.venv.copy(source))
 
     def state(self) -> dict[str, NDArray[Any]]:
-        own: dict[str, NDArray[Any]] = self.venv.state()
-        return own | {"history": self._history.frames.copy()}
+        return self.venv.state() | {"history": self._history.frames.copy()}
 
     def restore(self, state: Mapping[str, NDArray[Any]]) -> None:
-        own = dict(state)
-        self._history.frames[:] = own.pop("history")
-        self.venv.restore(own)
+        self._history.frames[:] = state["history"]
+        self.venv.restore({name: values for name, values in state.items() if name != "history"})

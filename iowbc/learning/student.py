@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from torch import Tensor
 
 from iowbc.learning import checkpoint
 from iowbc.learning.as_numpy import numpy_policy, student_policy
@@ -161,11 +160,9 @@ class StudentTraining:
     def _gradient_step(self) -> dict[str, float]:
         """One optimiser step with clipped gradient; returns the statistics of the loss before it."""
         histories, answers = self.experience.sample(self.settings.batch, self.random)
-        loss: Tensor
-        figures: dict[str, float]
         loss, figures = self.loss(torch.from_numpy(histories), torch.from_numpy(answers))
         self.optimizer.zero_grad()
-        loss.backward()  # type: ignore[no-untyped-call]
+        loss.backward()
         torch.nn.utils.clip_grad_norm_(self.loss.parameters(), self.settings.gradient_norm)
         self.optimizer.step()
         return figures

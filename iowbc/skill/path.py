@@ -67,8 +67,7 @@ class Paths:
 
     def curvature(self, path: Indices, covered: Array) -> Array:
         """Change of heading per arc length, (n,) [rad/m]."""
-        change: Array = self.heading(path, covered + SPACING) - self.heading(path, covered)
-        return change / SPACING
+        return (self.heading(path, covered + SPACING) - self.heading(path, covered)) / SPACING
 
     def _read(self, values: Array, path: Indices, covered: Array) -> Array:
         last = self._last[path]
