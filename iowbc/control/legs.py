@@ -30,9 +30,8 @@ class Legs(Constants):
     sole: Pair
     """The sole's centre from the ankle pitch axis."""
     roll: Pair
-    """The hip roll axis from the hip pitch axis."""
     yaw: Pair
-    """The hip yaw axis from the hip pitch axis."""
+    """The hip roll axis and the hip yaw axis from the hip pitch axis."""
     tilt: Pair
     """Direction of the hip yaw axis."""
     ankle_roll_z: Array

@@ -52,8 +52,7 @@ def robot_observation(
 
 def joined(parts: Mapping[str, Array]) -> Array:
     """Parts (n, k) or (n,) side by side, (n, sum of k) float32."""
-    columns = [values if values.ndim == 2 else values[:, None] for values in parts.values()]
-    return np.concatenate(columns, axis=1).astype(np.float32)
+    return np.column_stack([*parts.values()]).astype(np.float32)
 
 
 def of_object(measured: Measured, sees_object: bool) -> Array:

@@ -31,7 +31,6 @@ class ModelPolicy:
         self._starts = np.ones(0, np.bool_)
 
     def reset(self, which: Mask) -> None:
-        """Reset the marked environments, shape (n,)."""
         if self._starts.shape != which.shape:
             self._starts = np.ones(which.shape, np.bool_)
             self._motion = self._filter(len(which))

@@ -76,9 +76,8 @@ class DaggerPolicy:
     teachers: tuple[RowPolicy | HistoryPolicy, ...]
     """Those of a history receive the student's."""
     observation: slice
-    """Place of s_t in a row."""
     privileged: slice
-    """Place of s_priv in a row."""
+    """Places of s_t and of s_priv in a row."""
     masked: Indices
     """Indices in a row that are masked for the teachers, which receive the mean there."""
     teacher_of: Indices
@@ -86,7 +85,6 @@ class DaggerPolicy:
     taught: Mask
     """Environments in which the teacher acts, (n,)."""
     block: int
-    """Size of the blocks of environments, see `iowbc.rollouts.blocks`."""
     past: Past
 
     @property

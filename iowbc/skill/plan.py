@@ -25,9 +25,8 @@ class Plan:
     known: bool
     """True if the robot knows the path."""
     mass: float | None = None
-    """Object's mass [kg]; sampled from the task's range if empty."""
     share: float | None = None
-    """The human's share; sampled from the task's range if empty."""
+    """Object's mass [kg] and the human's share; sampled from the task's ranges if empty."""
     seed: int | None = None
     """Seed of the environment's episodes; if empty, from the game's seed and the environment's number."""
     rule: Rule | None = None

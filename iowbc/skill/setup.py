@@ -26,7 +26,6 @@ class GameSetup:
 
     specification: Specification
     student: Student
-    """The controller below the games."""
     count: int
     seed: int
     partners: tuple[str, ...]
