@@ -88,8 +88,7 @@ class Learner:
         self.caution = 1.0
         """Factor of the desired KL divergence."""
         self.value_alone = 0
-        """Environment steps up to which only the value network learns. The policy's learning rate is zero until then,
-        but the optimiser's moments follow its gradients."""
+        """Environment steps up to which only the value network learns: the policy's rate is zero, not its moments."""
 
     def save_for_sb3(self, path: Path) -> None:
         """Write a zip that stable-baselines3's `PPO.load` reads, for users' own code."""

@@ -36,8 +36,7 @@ class SoleLimits:
             [a * y, b * x, -mu * (x + y), -turn * a * mu, -turn * b * mu, -turn]
             for turn, a, b in product((1.0, -1.0), repeat=3)
         ]
-        load = [[0, 0, -1, 0, 0, 0]]
-        rows = np.array([*pyramid, *pressure, *torsion, *load], dtype=np.float64)
+        rows = np.array([*pyramid, *pressure, *torsion, [0, 0, -1, 0, 0, 0]], dtype=np.float64)
         bound = np.zeros(len(rows))
         bound[-1] = -self.smallest_load
         return rows, bound
