@@ -92,7 +92,7 @@ def policy_path(named: str) -> Path:
     if colon:
         spec = find_spec(package) if package.isidentifier() else None
         if spec is None or spec.origin is None:
-            brings = "; `pip install 'iowbc[public]'` brings it" if package == "holosoma_inference" else ""
+            brings = "; `pip install '.[public]'` in a checkout brings it" if package == "holosoma_inference" else ""
             raise StageFailed(f"{PLACE}.policy: needs the package {package}, which is not installed{brings}")
         path = Path(spec.origin).parent / inside
     if not path.exists():

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 SUITES = {"mujoco": "carry.yaml", "drake": "carry_drake.yaml"}
 """Suite of each engine, in the folder `public` of the recipes."""
-NO_DRAKE = "not installed: pip install 'iowbc[drake]'"
+NO_DRAKE = "not installed: pip install '.[drake]' in a checkout"
 FIGURES = {
     "E_v": (Column("E_v", "m/s"), ".3f"),
     "E_psi": (Column("E_ψ", "rad"), ".3f"),

@@ -30,8 +30,8 @@ def require_extra(extra: str, what: str) -> None:
     missing = [name for name in EXTRAS[extra] if find_spec(name) is None]
     if missing:
         raise UsageError(
-            f"`{what}` needs {', '.join(missing)}, which this installation leaves out: `pip install 'iowbc[{extra}]'` "
-            f"brings {'it' if len(missing) == 1 else 'them'}"
+            f"`{what}` needs {', '.join(missing)}, which this installation leaves out: "
+            f"`pip install '.[{extra}]'` in a checkout brings {'it' if len(missing) == 1 else 'them'}"
         )
 
 

@@ -55,7 +55,7 @@ class Operator(Protocol):
 
 class Remote:
     """The wireless remote, whose bytes come with the robot's state. Left stick: velocity; right stick: yaw rate;
-    arrows: height and torso pitch. B, and Start from zero torque: damping; X: stand; A: run; Select: zero torque."""
+    arrows: height and torso pitch. B or Start: damping; X: stand; A: run; Select: zero torque."""
 
     def __init__(self, ranges: Ranges) -> None:
         self._ranges, self._command, self._pressed, self._last = ranges, ranges.standing.copy(), 0, 0.0

@@ -355,7 +355,7 @@ def make_world(
     except ModuleNotFoundError as missing:
         if (missing.name or "").partition(".")[0] != "pydrake":
             raise
-        raise UsageError("eval.engine: drake is not installed: pip install 'iowbc[drake]'") from None
+        raise UsageError("eval.engine: drake is not installed: pip install '.[drake]' in a checkout") from None
     return DrakeWorld(robot, physics, scene, rows, timing, drake)
 
 

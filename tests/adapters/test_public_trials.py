@@ -193,7 +193,7 @@ def test_the_tutorial_plays_a_controller_of_ones_own(tmp_path: Path, monkeypatch
     carry("walker.onnx", "my_adapter.py", posture=True, workers=1, out=Path("page.md"))
     page = Path("page.md").read_text()
     assert "height and pitch" in page
-    assert "| in Drake | not installed: pip install 'iowbc[drake]' |" in page
+    assert "| in Drake | not installed: pip install '.[drake]' in a checkout |" in page
     (tmp_path / "recipes" / "public").symlink_to(RECIPES / "public")
     (tmp_path / "recipes" / "full.yaml").symlink_to(RECIPES / "full.yaml")
     digest = hashlib.sha256(policy.read_bytes()).hexdigest()

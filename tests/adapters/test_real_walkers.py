@@ -19,7 +19,7 @@ from iowbc.sim.simulation import Simulation
 
 pytestmark = [
     pytest.mark.integration,
-    pytest.mark.skipif(find_spec("holosoma_inference") is None, reason="`pip install 'iowbc[public]'` brings it"),
+    pytest.mark.skipif(find_spec("holosoma_inference") is None, reason="`pip install '.[public]'` brings it"),
     pytest.mark.filterwarnings("ignore"),
 ]
 RECIPE = Path(__file__).parents[2] / "recipes" / "public.yaml"

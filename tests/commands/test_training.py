@@ -30,7 +30,7 @@ def test_what_is_missing_is_said_in_one_sentence(tmp_path: Path, words: list[str
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
     assert f"`iowbc {words[0]}` needs mlflow, mujoco, torch" in done.stderr
-    assert "pip install 'iowbc[train]'" in done.stderr
+    assert "`pip install '.[train]'` in a checkout brings them" in done.stderr
     assert not (tmp_path / "runs").exists()
 
 
