@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from iowbc.control.command import HEIGHT, PITCH, YAW_RATE
+from iowbc.control.command import HEIGHT, OFFSET, PITCH, YAW_RATE
 from iowbc.deploy.contract import read_contract
 from iowbc.errors import UsageError
 from iowbc.onboard import messages
@@ -225,3 +225,16 @@ def test_an_unknown_source_is_refused(blind: Path, kind: str) -> None:
         operator(kind, read_contract(blind))
     with pytest.raises(UsageError, match=f"--object-pose {kind}: valid: udp:PORT"):
         udp_port(kind, "--object-pose")
+
+
+def test_a_command_is_clipped_to_what_training_commands_together(ranges: Ranges, blind: Path) -> None:
+    known = read_contract(blind).commands
+    asked = ranges.standing.copy()
+    asked[PITCH], asked[OFFSET] = 1.5, (0.2, 0.2, 0.2, -0.2, -0.2, -0.2)
+    standing = ranges.clipped(asked)
+    assert standing[PITCH] == known.deep_pitch[1]
+    assert standing[OFFSET] == pytest.approx([*known.single_offset, *np.negative(known.single_offset)])
+    asked[0], asked[OFFSET] = 9.0, 0.2
+    walking = ranges.clipped(asked)
+    assert walking[:6] == pytest.approx([known.velocity_x[1], 0, 0, known.nominal_height, known.pitch[1], 0.05])
+    assert walking[OFFSET] == pytest.approx([*known.common_offset] * 2)
