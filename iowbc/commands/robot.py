@@ -113,6 +113,9 @@ def robot(
             stopped=stop.is_set,
         )
         tell(console, str(times))
+        told = "" if writer is None else writer.failure
+    if writer is not None and writer.failure != told:
+        tell(console, f"--log {log}: {writer.failure}; its last messages are missing")
 
 
 def _stop_request() -> threading.Event:

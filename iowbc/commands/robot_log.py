@@ -24,12 +24,14 @@ def report_log(console: Console, what: str, log: Path, output: Path) -> None:
     if output.suffix != ".png":
         raise UsageError(f"--output {output}: the figure of a log is a PNG file; give a name that ends in .png")
     from iowbc.onboard.errors_of_run import UNITS, read_run
-    from iowbc.onboard.log import read_messages, replay
+    from iowbc.onboard.log import is_cut, read_messages, replay
 
     folder = exported_folder(what)
     controller = Controller.load(folder)
     turns, different = replay(log, folder)
     tell(console, f"{turns} commands replayed, {f'{different} differ' if different else 'all bit for bit the same'}")
+    if is_cut(log):
+        tell(console, f"{log} has no end: what came after these commands is missing")
     for topic, _, data in read_messages(log):
         if topic in ("event", "timing"):
             tell(console, f"  {json.loads(data)['text']}")

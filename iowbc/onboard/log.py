@@ -3,8 +3,8 @@
 All messages of a cycle of the loop share a time stamp: first `inputs`, last the low-level command.
 """
 
-import contextlib
 import json
+import os
 import queue
 import threading
 from collections.abc import Iterator
@@ -13,7 +13,7 @@ from typing import Any, BinaryIO, Self
 
 import numpy as np
 from mcap.reader import NonSeekingReader
-from mcap.writer import Writer
+from mcap.writer import MCAP0_MAGIC, Writer
 
 from iowbc.deploy.controller import Controller
 from iowbc.errors import Damaged, UsageError
@@ -92,10 +92,12 @@ class LogWriter:
     def __exit__(self, *exception: object) -> None:
         self._queue.put(None)
         self._thread.join()
-        with contextlib.suppress(OSError):  # the file is readable up to where it ends
-            if not self.failure:
-                self._writer.finish()
-            self._file.close()
+        try:  # a file that cannot be finished is readable up to where it ends
+            with self._file:
+                if not self.failure:
+                    self._writer.finish()
+        except OSError as error:
+            self.failure = self.failure or error.strerror or str(error)
 
 
 def _opened(path: Path) -> BinaryIO:
@@ -119,17 +121,24 @@ def read_about(path: Path) -> dict[str, str]:
     return dict(about)
 
 
+def is_cut(path: Path) -> bool:
+    """True for a log without its end, as of a process that was killed or a full disk. Raises UsageError."""
+    with _opened(path) as file:
+        file.seek(-min(len(MCAP0_MAGIC), file.seek(0, os.SEEK_END)), os.SEEK_END)
+        return file.read() != MCAP0_MAGIC
+
+
 def read_messages(path: Path) -> Iterator[tuple[str, float, bytes]]:
     """Topic, time [s] and data of every message, as written; a truncated file is read up to the cut. Raises UsageError
-    for a missing file, Damaged for one without a message."""
+    for a missing file, Damaged for one that is damaged or has no message."""
+    cut, found = is_cut(path), False
     with _opened(path) as file:
-        found = False
         try:
-            for _, channel, message in NonSeekingReader(file).iter_messages(log_time_order=False):
+            for _, channel, message in NonSeekingReader(file, validate_crcs=True).iter_messages(log_time_order=False):
                 found = True
                 yield channel.topic, 1e-9 * message.log_time, message.data
         except Exception as error:  # type depends on where the file was cut
-            if not found:
+            if not (found and cut):
                 raise Damaged(f"{path}: {type(error).__name__}: {error}") from error
 
 

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from still import Still
 
+from iowbc.errors import Damaged
 from iowbc.onboard import messages
-from iowbc.onboard.log import LogWriter
+from iowbc.onboard.log import LogWriter, is_cut, read_messages
 from iowbc.onboard.machine import OperatorRequest, State
 from iowbc.onboard.messages import Record
 from iowbc.onboard.process import FINAL_DAMPING, PERIOD, LockStep, drive
@@ -101,3 +102,30 @@ def test_a_full_disk_ends_the_log_alone(still: Still, tmp_path: Path) -> None:
     assert (commands[399]["motor_cmd"]["kp"][:29] > 0.0).all()
     assert sum("log: No space left on device; nothing more is logged" in line for line in told) == 1
     assert np.isfinite(commands[-1]["motor_cmd"]["kd"]).all()
+
+
+def test_a_log_that_cannot_be_finished_is_told_and_closed(tmp_path: Path) -> None:
+    with LogWriter(tmp_path / "log.mcap", {}) as log:
+        file = log._file
+
+        def full() -> None:
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+        log._writer.finish = full  # type: ignore[method-assign]
+    assert log.failure == "No space left on device"
+    assert file.closed
+
+
+def test_a_cut_log_is_known_and_a_damaged_one_refused(still: Still, tmp_path: Path) -> None:
+    path = tmp_path / "log.mcap"
+    with LogWriter(path, {}) as log:
+        driven(still, 20, log=log)
+    whole, count = path.read_bytes(), len(list(read_messages(path)))
+    assert not is_cut(path)
+    path.write_bytes(whole[:-100])
+    assert is_cut(path)
+    assert len(list(read_messages(path))) == count
+    middle = len(whole) // 2
+    path.write_bytes(whole[:middle] + bytes([whole[middle] ^ 1]) + whole[middle + 1 :])
+    with pytest.raises(Damaged, match=r"log\.mcap"):
+        list(read_messages(path))
