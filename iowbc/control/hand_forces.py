@@ -22,6 +22,10 @@ class HandForces:
         self._sum = np.zeros((3, n, len(robot.joints)))
         self._count = 0
 
+    def restart(self) -> None:
+        """Drops the control steps of a decision that was broken off."""
+        self._sum[:], self._count = 0.0, 0
+
     def add(self, target: Array, position: Array, velocity: Array) -> None:
         """Adds a control step: joint targets and measurements, (n, joints) [rad, rad/s]."""
         self._sum += np.stack([target, position, velocity])
@@ -34,7 +38,7 @@ class HandForces:
         Without acceleration τ = g(q) - Jᵀ F, hence F = (J Jᵀ + λ)⁻¹ J (g - τ) with τ = kp (target - q) - kd q̇.
         """
         target, position, velocity = self._sum / self._count
-        self._sum[:], self._count = 0.0, 0
+        self.restart()
         own, waist = self._robot.interaction, position[:, self._robot.waist]
         torque = self._robot.kp[own] * (target - position)[:, own] - self._robot.kd[own] * velocity[:, own]
         frames = self._arms.frames(position[:, own])

@@ -81,6 +81,7 @@ class GameBatch:
         self._episode[:] = 0
         for name in ("reward", "terminated", "truncated"):
             self.buffers[name][:] = 0
+        self._hands.restart()
         self._begin(np.arange(self.n))
         self._observe()
 

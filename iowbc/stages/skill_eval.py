@@ -30,6 +30,8 @@ def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
         yield "skill.eval.partners", "agent: no stage of the recipe trains a human; add `skill` to its stages"
     if "skill" not in recipe.stages and asked.controllers:
         yield "skill.eval.controllers", "no stage of the recipe trains a skill; add `skill` to its stages"
+    if {*asked.partners} == {"follower"} and True not in asked.known:
+        yield "skill.eval", "a follower plays only where the goal is known: add true to `known`, or another partner"
     tasks = {name: getattr(recipe.skill.tasks, name) for name in recipe.skill.tasks.names}
     for name in asked.tasks:
         if name not in tasks:

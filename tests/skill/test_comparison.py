@@ -98,6 +98,14 @@ def test_every_combination_is_planned_once_and_nobody_follows_a_follower(make) -
     assert masses["push_straight"] == {65.0}
 
 
+def test_no_episode_is_planned_twice(make) -> None:  # type: ignore[no-untyped-def]
+    """A task of one mass, with two loads; and a learnt human among the partners of training."""
+    changes = {"skill.eval.loads": (0.0, 1.0), "skill.partners.training": ("path", "agent")}
+    planned = planned_games(make(changes=changes).setup.skill, learnt_human=True)
+    assert len({case.mass for case in planned if case.task == "tyre_straight"}) == 1
+    assert len(planned) == len({(case.task, case.partner, case.known, case.mass, case.seed) for case in planned})
+
+
 def test_all_competitors_play_the_same_episodes_and_finished_batches_are_kept(
     world: Specification, student: Student, tmp_path: Path
 ) -> None:

@@ -9,6 +9,7 @@ import pytest
 import torch
 from changes import with_changes
 
+from iowbc.arrays import Array
 from iowbc.errors import NoDisplay
 from iowbc.learning.networks import TeacherNetwork
 from iowbc.sim.rendering import appearance
@@ -68,3 +69,16 @@ def test_a_window_needs_a_display(game: SingleGame, monkeypatch: pytest.MonkeyPa
         monkeypatch.delenv(name, raising=False)
     with pytest.raises(NoDisplay, match="--video"):
         show_game(game)
+
+
+def test_a_game_that_restarts_within_a_decision_feels_the_same_as_a_new_one(game: SingleGame) -> None:
+    def felt(steps: int) -> Array:
+        for _ in range(steps):
+            game.control()
+            game.judge()
+        return game.batch._hands.felt[0, -1].copy()
+
+    new = felt(game.batch.substeps)
+    felt(game.batch.substeps - 1)
+    game.reset()
+    assert (felt(game.batch.substeps) == new).all()

@@ -127,3 +127,9 @@ def test_what_no_student_or_nobody_carries_out_is_said_before_anything_runs() ->
     unfit = transport(**{"stages": ("teacher", "distill", "skill-eval"), "skill.eval.masses": {"push": (10.0,)}})
     unfit = with_changes(unfit, {"skill.eval.controllers": {"WBC": "wbc.yaml"}, "skill.eval.partners": ("path",)})
     assert [path for path, _ in skill_eval.problems(unfit)] == ["skill.eval.controllers", "skill.eval.masses.push"]
+
+
+def test_followers_alone_have_no_game_in_which_only_the_human_knows_the_path() -> None:
+    asked = {"skill.eval.partners": ("follower",), "skill.eval.known": (False,)}
+    assert [place for place, _ in skill_eval.problems(transport(**asked))] == ["skill.eval"]
+    assert list(skill_eval.problems(transport(**asked | {"skill.eval.known": (True,)}))) == []

@@ -240,8 +240,8 @@ class Impedance(Section):
     """Amplitude of the force [N]; small compared with the partner's 80 N, large compared with balancing motion."""
     begin: float = Field(default=2.0, ge=0)
     """Start of the pull [s]."""
-    cycles: int = Field(default=3, ge=1)
-    """Smallest number of periods of a pull."""
+    cycles: int = Field(default=3, ge=2)
+    """Smallest number of periods of a pull; the first one is not measured."""
     shortest: float = Field(default=6.0, gt=0)
     """Smallest duration of a pull [s]; it lasts a whole number of periods."""
     walk: tuple[Segment, ...] = Field(default=WALKING_ON, min_length=1)

@@ -1,7 +1,7 @@
 """The skill layer of a recipe: tasks, agents and reward of the Markov game."""
 
 from collections.abc import Mapping
-from typing import Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
@@ -11,6 +11,7 @@ from iowbc.recipe.section import (
     LATER,
     ArtifactName,
     Ascending,
+    Distinct,
     HiddenLayers,
     Positive,
     PositiveRange,
@@ -106,14 +107,14 @@ class SkillEvaluation(Section):
     """Other controllers for this recipe's skill, by label: recipes with `distill` whose student replaces the controller
     of its training. References, command ranges, action scale, control frequency and reference generator are those of
     the other recipe; simulation and the skill's observation are those of this recipe."""
-    tasks: tuple[str, ...] = ()
+    tasks: Annotated[tuple[str, ...], Distinct] = ()
     """Tasks of `skill.tasks`; empty: all."""
-    known: tuple[bool, ...] = (True, False)
+    known: Annotated[tuple[bool, ...], Distinct] = (True, False)
     """Knowledge of the path: `true` if the robot has it, `false` if only the human does."""
-    partners: tuple[PartnerKind, ...] = ()
+    partners: Annotated[tuple[PartnerKind, ...], Distinct] = ()
     """Humans: scripted behaviours, and `agent` for the learnt one. Empty: those of training, those held out, and the
     learnt one."""
-    loads: tuple[Share, ...] = Field(default=(0.5,), min_length=1)
+    loads: Annotated[tuple[Share, ...], Distinct] = Field(default=(0.5,), min_length=1)
     """Masses as fractions of the task's range: 0 is its lower end, 1 its upper end."""
     masses: dict[ObjectScene, Ascending] = Field(default_factory=dict, json_schema_extra=LATER)
     """Masses of a scene's tasks [kg], which replace `loads` and may lie outside the task's range."""

@@ -46,7 +46,8 @@ class Competitor:
 def planned_games(skill: Skill, learnt_human: bool) -> list[Plan]:
     """All episodes of an evaluation. `learnt_human`: true if there is a trained human."""
     asked, kinds = skill.eval, skill.partners
-    partners: Sequence[str] = asked.partners or (*kinds.training, *kinds.held_out, *([AGENT] if learnt_human else []))
+    usual = (*kinds.training, *kinds.held_out, *([AGENT] if learnt_human else []))
+    partners = dict.fromkeys(asked.partners or usual)
     tasks = {name: getattr(skill.tasks, name) for name in asked.tasks or skill.tasks.names}
     found = []
     for (name, task), known, partner in itertools.product(tasks.items(), asked.known, partners):
@@ -54,7 +55,7 @@ def planned_games(skill: Skill, learnt_human: bool) -> list[Plan]:
             continue  # a follower does not reveal the goal
         low, high = task.mass
         masses = asked.masses.get(task.scene) or [low + load * (high - low) for load in asked.loads]
-        for mass, episode in itertools.product(masses, range(asked.episodes)):
+        for mass, episode in itertools.product(dict.fromkeys(masses), range(asked.episodes)):
             found.append(Plan(name, partner, known, mass=mass, seed=asked.seed + episode))
     return found
 
