@@ -48,7 +48,7 @@ def test_a_missing_drake_is_named_with_its_extra(robot, monkeypatch):
     for name in [name for name in sys.modules if name.startswith(("pydrake", "iowbc.sim.drake"))]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "pydrake", None)
-    with pytest.raises(UsageError, match=r"iowbc\[drake\]"):
+    with pytest.raises(UsageError, match=r"pip install .\.\[drake\]"):
         Simulation(robot, Recipe(), envs=np.zeros(1, np.int64), seed=0, scenes=["free"], drake=Drake())
 
 
