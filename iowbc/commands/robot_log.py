@@ -10,7 +10,7 @@ from rich.console import Console
 from iowbc.commands import options
 from iowbc.commands.printed import plain_table, shown_path, tell
 from iowbc.deploy.controller import Controller
-from iowbc.deploy.exported_folder import exported_folder
+from iowbc.deploy.exported_folder import RECIPE, exported_folder
 from iowbc.errors import UsageError
 
 if TYPE_CHECKING:
@@ -41,6 +41,8 @@ def report_log(console: Console, what: str, log: Path, output: Path) -> None:
     for name, values in run.deviations().items():
         table.add_row(name, f"{np.mean(values):.3f}", f"{np.quantile(values, 0.95):.3f}", UNITS[name])
     console.print(table)
+    if json.loads((folder / RECIPE).read_text(encoding="utf-8"))["rg"]["height"] == "com":
+        tell(console, "E_h compares the pelvis with the commanded height of the centre of mass, which no log has")
     _draw(run, output)
     tell(console, f"{shown_path(output)}: command and robot over time")
 
