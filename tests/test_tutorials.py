@@ -20,6 +20,7 @@ from typer.core import TyperGroup
 from iowbc.cli import app
 from iowbc.learning.curves import TABLE
 from iowbc.recipe.reading.loading import load_recipe
+from iowbc.reference.labels.plan import SamplePlan
 from iowbc.robot.description import load_robot
 from iowbc.stages import teacher
 from iowbc.stages.registry import STAGES
@@ -124,6 +125,8 @@ def test_add_a_robot(place: Path) -> None:
     env = VectorEnv(Specification(recipe, robot.folder), num_envs=2, workers=0, seed=0)
     env.reset()
     env.close()
+    plan = SamplePlan(robot, recipe.rg, seed=0)
+    assert plan.draw(np.arange(4))[0].arm.shape == (len(robot.interaction),)
 
 
 def test_add_a_transport_task(place: Path) -> None:

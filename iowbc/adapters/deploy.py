@@ -43,7 +43,7 @@ def adapter(policy: Path) -> Adapter:
     said = _configuration(_only(policy, CONFIGURATION))
     try:
         return _described(said, policy)
-    except (KeyError, TypeError, IndexError, ValueError) as error:
+    except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
         text = f"its {CONFIGURATION} describes no controller of joint positions that is read here"
         raise StageFailed(f"{policy}: {text}: {type(error).__name__}: {error}") from error
 
@@ -52,6 +52,8 @@ def _described(said: Mapping[str, Any], policy: Path) -> Adapter:
     order, action = [int(place) for place in said["joint_ids_map"]], said["actions"]["JointPositionAction"]
     if action.get("joint_ids") is not None or action.get("clip") is not None:
         raise ValueError("actions of some joints, or clipped ones, are not read")
+    if min(order) < 0:
+        raise ValueError(f"joint_ids_map: {min(order)} is no motor")
     joints, default = tuple(MOTORS[place] for place in order), np.array(said["default_joint_pos"], np.float64)
     if not np.array_equal(np.array(action["offset"], np.float64), default):
         raise ValueError("actions that do not begin at default_joint_pos are not read")

@@ -4,7 +4,9 @@ Joints, gains and ranges are in the metadata of the ONNX file, the other numbers
 configuration for the G1.
 """
 
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -38,6 +40,14 @@ def adapter(policy: Path) -> Adapter:
     said, run = metadata(policy), network(policy)
     if missing := [name for name in ("dof_names", "kp", "kd", "command_ranges") if name not in said]:
         raise StageFailed(f"{policy}: its metadata lacks {', '.join(missing)}, which walkers of holosoma have")
+    try:
+        return _described(said, run)
+    except (LookupError, TypeError, ValueError, AttributeError) as error:
+        text = "its metadata describe no walker of holosoma that is read here"
+        raise StageFailed(f"{policy}: {text}: {type(error).__name__}: {error}") from error
+
+
+def _described(said: Mapping[str, Any], run: Callable[[Array], Array]) -> Adapter:
     joints = tuple(said["dof_names"])
     default = [DEFAULT.get(name.removesuffix("_joint"), DEFAULT.get(kind_of(name), 0.0)) for name in joints]
     return Adapter(

@@ -93,6 +93,8 @@ def _to_remove(
         last = {artifact.manifest.key for name in known for artifact in last_used(store, name).values()}
         limit = time.time() - older_than * DAY if older_than else 0.0
         spared = last | {key for name in known for key, used in ever_used(runs, name).items() if used >= limit}
+        borrowed = {digest for one in own if one.manifest.key in spared for digest in _borrowed(one.ingredients)}
+        spared |= {one.manifest.key for one in own if one.manifest.digest in borrowed}
         for artifact in free:
             if artifact.manifest.key not in spared and artifact.manifest.seconds < LONG_STAGE:
                 yield artifact.folder

@@ -42,7 +42,7 @@ class Sampling(Section):
     """Fraction of the samples moved onto the edge of the command ranges, to avoid extrapolation there."""
     nominal_share: Share = 0.03
     """Fraction of the samples with the arms at the default posture."""
-    mirrored_share: Share = 0.05
+    mirrored_share: float = Field(default=0.05, ge=0.0, le=0.5)
     """Fraction of the samples that mirror another one left to right, to measure the labels' symmetry."""
 
     def problems(self) -> Problems:

@@ -100,7 +100,8 @@ def _cell(values: NDArray[np.float64]) -> Cell:
 
 def _of_one_variant(first: Run, second: Run) -> bool:
     """True if two runs differ only in their seeds: in their recipes or, if both are evaluated, in the ingredients of
-    their artifacts' keys, which also match for recipes recorded by different versions of the program."""
+    their artifacts' keys, which also match for recipes recorded by different versions of the program. Runs of one seed
+    differ in what they begin from."""
     recipe = _seedless(first.recipe)
     if recipe and recipe == _seedless(second.recipe):
         return True
@@ -108,8 +109,17 @@ def _of_one_variant(first: Run, second: Run) -> bool:
     decided = [
         [_seedless(run.artifacts[stage].ingredients.get("recipe", {})) for stage in shared] for run in (first, second)
     ]
-    labels = [run.recipe.get("eval", {}).get("label") for run in (first, second)]
-    return "eval" in shared and all(decided[0]) and decided[0] == decided[1] and labels[0] == labels[1]
+    if "eval" not in shared or not all(decided[0]) or decided[0] != decided[1]:
+        return False
+    (label, seeds, robots), other = (
+        (
+            run.recipe.get("eval", {}).get("label"),
+            [flattened(run.recipe).get(path) for path in SEEDS],
+            [run.artifacts[stage].ingredients.get("robot") for stage in shared],
+        )
+        for run in (first, second)
+    )
+    return label == other[0] and seeds != other[1] and robots == other[2]
 
 
 def _seedless(recipe: Mapping[str, Any]) -> dict[str, Any]:

@@ -18,6 +18,10 @@ if TYPE_CHECKING:
 
 FAILS = "Fails"
 ABSENT = "–"
+LATEX_ESCAPES = str.maketrans(
+    {sign: f"\\{sign}" for sign in "%_&#${}"}
+    | {"~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "\\": r"\textbackslash{}"}
+)
 LATEX_SIGNS = str.maketrans(
     {"±": r"$\pm$", "–": "--", "≥": r"$\geq$", "μ": r"$\mu$", "·": r"$\cdot$", "Δ": r"$\Delta$", "<": "$<$"}
 )
@@ -121,7 +125,7 @@ def latex(table: Table) -> str:
     style = frame.set_index(head[:2]).style.format_index(escape="latex") if table.grouped else frame.style.hide()
     style = style.format(escape="latex").format_index(escape="latex-math", axis="columns")
     text = style.to_latex(
-        caption=table.caption.replace("%", r"\%").replace("_", r"\_"),
+        caption=table.caption.translate(LATEX_ESCAPES),
         label=f"tab:{table.name}",
         position="h",
         position_float="centering",

@@ -67,12 +67,14 @@ def side_by_side(maps: Sequence[MirrorMap]) -> MirrorMap:
 
 def joint_mirror(robot: Robot) -> MirrorMap:
     """Mirror of all joint positions, velocities or torques, in MJCF order, shape (..., joints). A hinge is an axial
-    vector: reflection keeps a rotation about y and reverses one about x or z."""
+    vector: reflection keeps a rotation about y and reverses one about x or z, unless both axes have opposite
+    directions."""
     other = {"left": "right", "right": "left"}
     sides = [(other.get(side, side), rest) for side, *rest in (name.split("_") for name in robot.joints)]
     permutation = np.array([robot.joints.index("_".join([side, *rest])) for side, rest in sides])
     leading = [int(np.argmax(np.abs(hinge.axis))) for hinge in robot.tree.hinges()]
-    return MirrorMap(permutation, AXIAL_SIGN[leading])
+    along = np.array([np.sign(hinge.axis[place]) for hinge, place in zip(robot.tree.hinges(), leading, strict=True)])
+    return MirrorMap(permutation, AXIAL_SIGN[leading] * along * along[permutation])
 
 
 def joint_magnitude(robot: Robot) -> MirrorMap:

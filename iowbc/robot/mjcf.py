@@ -146,6 +146,14 @@ def small_text(path: Path) -> str:
     return read_limited(path, LARGEST_FILE).decode("utf-8")
 
 
+UNREAD = {
+    "compiler": dict.fromkeys(("settotalmass", "eulerseq"), "give masses, and orientations as quat, on the elements"),
+    "body": dict.fromkeys(("euler", "axisangle", "xyaxes", "zaxis"), "give the orientation as quat"),
+    "joint": {"pos": "place the body's origin on its joint's axis"},
+}
+"""Attributes by element that would change the model and are not read, and what to write instead."""
+
+
 def read_tree(path: Path) -> Tree:
     """Reads a self-contained MJCF, with its numbers on the elements themselves (classes decide contact and look).
     Raises OSError, or ValueError with what is wrong."""
@@ -159,6 +167,14 @@ def read_tree(path: Path) -> Tree:
                 f"{path}: <{element.tag} file={element.get('file')!r}> reads another file, and no export takes it: "
                 "describe all in this one, with primitive shapes"
             )
+        for attribute, instead in UNREAD.get(element.tag, {}).items():
+            if attribute in element.attrib:
+                named, value = element.get("name", "the model"), element.attrib[attribute]
+                text = f"<{element.tag} {attribute}={value!r}> of {named!r} is not read"
+                raise ValueError(f"{path}: {text}: {instead}")
+    compiler = root.find("compiler")
+    if compiler is None or compiler.get("angle") != "radian":
+        raise ValueError(f'{path}: angles are read in radians: give <compiler angle="radian"/>')
     world = root.find("worldbody")
     if world is None:
         raise ValueError(f"{path}: no <worldbody>")

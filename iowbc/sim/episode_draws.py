@@ -137,9 +137,9 @@ class Draws:
             return
         chance = random.uniform(key, "uncommon", 5)
         light, slow = chance[:, 0] < settings.light_share, chance[:, 1] < settings.slow_share
-        low = settings.object_mass_scale.low
-        scale = low * (max(settings.light_end, low) / low) ** chance[:, 2]
-        if settings.object_mass_scale.enabled:
+        if settings.light_share and settings.object_mass_scale.enabled:
+            low = settings.object_mass_scale.low
+            scale = low * (max(settings.light_end, low) / low) ** chance[:, 2]
             row[light, self._table.columns["object_mass_scale"].start] = scale[light]
         for place, name in enumerate(("action_latency", "sensor_latency"), 3):
             drawn = getattr(settings, name)

@@ -102,7 +102,7 @@ class Batch:
         """Reseeds all random number streams from seeds (n,)."""
         self._schedule.reseed(seeds)
         self.simulation.reseed(self._schedule.key)
-        self.memory.episode[:] = 0
+        self.memory.episode[:], self.memory.failed[:] = 0, False
 
     def step(self) -> None:
         """One control step of every environment; those that end start a new episode."""

@@ -40,7 +40,7 @@ def test_a_package_that_is_not_installed_is_named_with_what_brings_it() -> None:
 
 def test_the_wheel_that_is_missing_is_named_with_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("iowbc.adapters.source.find_spec", lambda name: None)
-    with pytest.raises(StageFailed, match=r"needs the package holosoma_inference.*pip install 'iowbc\[public\]'"):
+    with pytest.raises(StageFailed, match=r"needs the package holosoma_inference.*pip install '\.\[public\]'"):
         policy_path("holosoma_inference:models/walker.onnx")
 
 

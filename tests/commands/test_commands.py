@@ -194,6 +194,20 @@ def test_a_run_with_overrides_leaves_the_recipes_name_to_what_it_had(folder: Pat
     assert command("run", "first.yaml").stdout.count(": cached") == 6
 
 
+def test_a_name_stands_for_no_results_of_a_policy_that_was_trained_anew(
+    folder: Path, command: Command, key: Key
+) -> None:
+    record, before = folder / "runs" / "recipes" / "first.json", key("first", "teacher")
+    (folder / "first.yaml").write_text("seed: 4\nteacher:\n  steps: 4096\nexecution: {track: false}\n")
+    assert command("run", "first.yaml", "--until", "teacher").returncode == 0
+    assert key("first", "teacher") != before
+    assert list(json.loads(record.read_text())["stages"]) == ["rg-dataset", "rg-fit", "teacher"]
+    assert sorted(path.name for path in (folder / "runs" / "first").iterdir()) == ["rg-dataset", "rg-fit", "teacher"]
+    (folder / "first.yaml").write_text("seed: 3\nteacher:\n  steps: 4096\nexecution: {track: false}\n")
+    assert command("run", "first.yaml").stdout.count(": cached") == 6
+    assert len(json.loads(record.read_text())["stages"]) == 6
+
+
 def test_gc_removes_what_was_used_long_ago_only_when_told_how_long(folder: Path, command: Command, key: Key) -> None:
     assert command("run", "first.yaml", "--set", "seed=4").returncode == 0
     teachers = folder / "runs" / "store" / "teacher"

@@ -18,7 +18,7 @@ from iowbc.evaluation.report.interquartile import interquartile_table
 from iowbc.evaluation.report.other_tables import contact_table, joint_table, success_table
 from iowbc.evaluation.report.report import write_report
 from iowbc.evaluation.trials.errors import ERRORS
-from iowbc.results.table import latex, markdown
+from iowbc.results.table import Table, heads, latex, markdown
 
 
 def test_a_case_that_two_suites_have_is_named_after_its_suite() -> None:
@@ -176,6 +176,12 @@ def test_heavy_cases_show_rate_interval_and_the_papers_rate() -> None:
     text = markdown(success_table(summary))
     assert "| tyre (18 kg) | IO-WBC | 4/5 | 4/5 | 80 % | 38 to 96 % | 80 % |" in text
     assert "stands still | – | none | 0 %" in text
+
+
+def test_latex_captions_show_every_sign_of_a_label() -> None:
+    caption = r"A&B #1 of $x, 5 % {w/o} a_b ~ ^ \ end"
+    text = latex(Table("made_up", caption, heads("one"), [("1",)], grouped=False))
+    assert r"A\&B \#1 of \$x, 5 \% \{w/o\} a\_b \textasciitilde{} \textasciicircum{} \textbackslash{} end" in text
 
 
 def test_latex_groups_rows_and_escapes() -> None:

@@ -33,6 +33,26 @@ def test_branches_cover_the_joints_in_the_papers_order(robot: Robot) -> None:
     assert [joint.removesuffix("_joint") for joint in robot.joints[12:15]] == ["waist_yaw", "waist_roll", "waist_pitch"]
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ('angle="radian" ', "", 'give <compiler angle="radian"/>'),
+        ("<compiler ", '<compiler settotalmass="50" ', "settotalmass='50'> of 'the model' is not read"),
+        ('<body name="torso_link" ', '<body name="torso_link" euler="0 0 1" ', "euler='0 0 1'> of 'torso_link'"),
+        ('<joint name="left_knee_joint" ', '<joint name="left_knee_joint" pos="0 0 1" ', "of 'left_knee_joint'"),
+    ],
+)
+def test_a_model_that_would_be_read_differently_from_mujoco_is_refused(
+    folder: Path, old: str, new: str, told: str
+) -> None:
+    path = folder / "g1.xml"
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+    with pytest.raises(ValueError, match=re.escape(told)):
+        load_robot(folder)
+
+
 def test_an_unknown_robot_is_answered_with_the_known_ones() -> None:
     with pytest.raises(UsageError, match=r"no robot 'g2'.*known robots: g1"):
         robot_folder("g2")

@@ -1,5 +1,8 @@
 """The robot is symmetric, and the mirror maps say how."""
 
+import re
+import shutil
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -7,7 +10,7 @@ import pinocchio
 import pytest
 from pinocchio_states import configuration
 
-from iowbc.robot.description import Robot
+from iowbc.robot.description import Robot, load_robot
 from iowbc.robot.mirror import (
     AXIAL_SIGN,
     QUATERNION_SIGN,
@@ -46,6 +49,19 @@ def test_a_left_joint_becomes_its_right_counterpart(robot: Robot) -> None:
         assert other == (f"{swapped[side]}_{rest}" if side in swapped else name)
     for name, sign in zip(robot.joints, mirror.sign, strict=True):
         assert sign == (1.0 if "pitch" in name or "knee" in name or "elbow" in name else -1.0)
+
+
+def test_axes_of_opposite_directions_change_the_sign(robot: Robot, tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(robot.folder, tmp_path / "other"))
+    text = (folder / "g1.xml").read_text()
+    joint = re.search(r'<joint name="right_hip_yaw_joint"[^>]*axis="0 0 1"', text)
+    assert joint is not None
+    (folder / "g1.xml").write_text(text.replace(joint[0], joint[0].replace('axis="0 0 1"', 'axis="0 0 -1"')))
+    changed = joint_mirror(load_robot(folder)).sign != joint_mirror(robot).sign
+    assert [name for name, other in zip(robot.joints, changed, strict=True) if other] == [
+        "left_hip_yaw_joint",
+        "right_hip_yaw_joint",
+    ]
 
 
 def test_limits_gains_and_default_posture_are_symmetric(robot: Robot) -> None:

@@ -64,11 +64,16 @@ def capacity_table(summary: pd.DataFrame, rate: float) -> Table:
     return _table("capacity", caption, load_capacities(summary, rate), columns, "kg", [still])
 
 
+def masses_of(rows: pd.DataFrame) -> str:
+    """The masses of some rows in words; standing and walking may differ."""
+    return " or ".join(f"{mass:g} kg" for mass in sorted(set(rows["mass"])))
+
+
 def push_table(summary: pd.DataFrame, rate: float) -> Table:
     """The largest impulse on the base that each variant survives, by direction."""
     pushes = summary[summary["kind"] == "pushes"]
     caption = (
-        f"Largest impulse on the base, by direction, standing or walking with {float(pushes['mass'].iloc[0]):g} kg in "
+        f"Largest impulse on the base, by direction, standing or walking with {masses_of(pushes)} in "
         f"the hands, up to which the robot survives every impulse played, and walks on, in at least {100 * rate:.0f} % "
         "of the trials. In simulation, without a partner."
     )

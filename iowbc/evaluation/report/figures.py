@@ -15,7 +15,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from iowbc.arrays import Array
 from iowbc.evaluation.paper import TABLES, VARIANTS
 from iowbc.evaluation.report.aggregate import suites_of, variants_of
-from iowbc.evaluation.report.capacity import Capacities, load_capacities, push_capacities
+from iowbc.evaluation.report.capacity import Capacities, load_capacities, masses_of, push_capacities
 from iowbc.evaluation.report.captions import conditions
 from iowbc.evaluation.report.columns import STANDS_STILL
 from iowbc.evaluation.report.error_tables import NUMBERS, SWEPT, in_paper
@@ -106,8 +106,7 @@ def robustness(summary: pd.DataFrame, rate: float) -> Figure:
         _success_panel(axes, summary[summary["suite"] == suite], f"success, {suite}")
     if len(pushes):
         _capacity_bars(panels[-1], push_capacities(summary, rate), list(dict.fromkeys(pushes["case"])))
-        title = f"impulse survived, {float(pushes['mass'].iloc[0]):g} kg"
-        panels[-1].set(title=title, ylabel="impulse [N·s]")
+        panels[-1].set(title=f"impulse survived, {masses_of(pushes)}", ylabel="impulse [N·s]")
     return finish(figure, panels, "", panels[0])
 
 

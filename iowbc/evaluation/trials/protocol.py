@@ -113,7 +113,8 @@ class Protocol:
             further = [trial for sweep, mass in going for trial in sweep.trials([mass])]
             tables.append(self._round(len(tables), further))
         suites = list(dict.fromkeys(trial.suite for trial in named))
-        return pd.concat(tables).sort_values(
+        labelled = pd.concat(tables).assign(variant=recipe.eval.label)  # batches may come from before a change of it
+        return labelled.sort_values(
             ["suite", "mass"],
             key=lambda values: values.map(suites.index) if values.name == "suite" else values,
             ignore_index=True,

@@ -12,7 +12,7 @@ from pydantic import BaseModel
 from iowbc.errors import Damaged, UsageError
 from iowbc.files import write_whole
 from iowbc.pipeline.console.wording import KEY_LENGTH
-from iowbc.pipeline.store.artifact import MANIFEST, RECIPE, Artifact
+from iowbc.pipeline.store.artifact import INGREDIENTS, MANIFEST, RECIPE, Artifact
 from iowbc.pipeline.store.locks import lock_path, named_lock
 from iowbc.pipeline.store.runs import Runs, read_json, read_record
 from iowbc.recipe.reading.loading import LoadedRecipe
@@ -58,11 +58,41 @@ def remember(runs: Runs, loaded: LoadedRecipe, artifact: Artifact) -> None:
             record.file, record.overrides = str(loaded.file), list(loaded.overrides)
             record.recipe = loaded.recipe.model_dump(mode="json")
             record.stages[stage] = Use(key=key, time=time.time())
+            for other in _outdated(runs, record, artifact):
+                del record.stages[other]
+                (runs.root / name / other).unlink(missing_ok=True)
             _link(runs, name, stage, artifact.folder)
         elif stage not in record.stages or record.stages[stage].key != key:
             _link(runs, name, _with_key(stage, artifact.folder), artifact.folder)
         record.ever[key] = time.time()
         write_whole(record_path(runs, name), record.model_dump_json(indent=1))
+
+
+def _outdated(runs: Runs, record: LastUsed, artifact: Artifact) -> list[str]:
+    """Stages of a record that were made from another artifact of this one's stage, or from such a stage."""
+    read = {
+        stage: next(
+            (
+                read_json(path).get("inputs", {})
+                for root in (runs.store, runs.published)
+                if (path := root / stage / use.key / INGREDIENTS).is_file()
+            ),
+            {},
+        )
+        for stage, use in record.stages.items()
+    }
+    found: list[str] = []
+    while more := [
+        stage
+        for stage, inputs in read.items()
+        if stage not in found
+        and (
+            inputs.get(artifact.manifest.stage, artifact.manifest.digest) != artifact.manifest.digest
+            or inputs.keys() & {*found}
+        )
+    ]:
+        found += more
+    return found
 
 
 def ever_used(runs: Runs, recipe: str) -> dict[str, float]:

@@ -66,13 +66,17 @@ class SamplePlan:
             samples.append(sample if index < self.original else Sample(self.mirror(sample.arm), sample.command))
         return samples
 
+    def _unbent(self, n: int) -> Array:
+        """The waist's joints at zero, (n, joints)."""
+        return np.zeros((n, len(self.robot.waist)))
+
     def _carrying(self) -> Array:
         """Arms that keep the wrists at their default place in the heading frame, one posture a pitch, (pitches, 14)."""
         wrist, _ = self.kinematics.forward(self.rest[None])
-        upright, origin = self.kinematics.torso_in_heading(np.zeros((1, 3)), np.zeros(1))
+        upright, origin = self.kinematics.torso_in_heading(self._unbent(1), np.zeros(1))
         place = np.einsum("nij,nsj->nsi", upright, wrist) + origin[:, None]
         everywhere = np.repeat(place, len(self.pitches), axis=0)
-        target = self.kinematics.into_torso(np.zeros((len(self.pitches), 3)), self.pitches, everywhere)
+        target = self.kinematics.into_torso(self._unbent(len(self.pitches)), self.pitches, everywhere)
         return self.kinematics.solve(np.tile(self.rest, (len(self.pitches), 1)), target)
 
     def _commands(self, unit: Array) -> Array:
@@ -100,8 +104,7 @@ class SamplePlan:
         corner = np.stack([_scale(place[:, i], each) for i, each in enumerate((region.x, region.y, region.z))], axis=1)
         shift = region.asymmetry * (2.0 * place[:, 3:] - 1.0)
         target = np.stack([corner + shift, corner - shift], axis=1) * np.array([[1.0, 1.0, 1.0], [1.0, -1.0, 1.0]])
-        waist = np.zeros((len(unit), 3))
-        leaning = self.kinematics.into_torso(waist, command[:, 1], target)
+        leaning = self.kinematics.into_torso(self._unbent(len(unit)), command[:, 1], target)
         target = np.where(heading[:, None, None], leaning, target)
         start = np.clip(self.rest + region.redundancy * (2.0 * turn - 1.0), self.lower, self.upper)
         if by_wrist.any():
