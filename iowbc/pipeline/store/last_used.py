@@ -70,17 +70,10 @@ def remember(runs: Runs, loaded: LoadedRecipe, artifact: Artifact) -> None:
 
 def _outdated(runs: Runs, record: LastUsed, artifact: Artifact) -> list[str]:
     """Stages of a record that were made from another artifact of this one's stage, or from such a stage."""
-    read = {
-        stage: next(
-            (
-                read_json(path).get("inputs", {})
-                for root in (runs.store, runs.published)
-                if (path := root / stage / use.key / INGREDIENTS).is_file()
-            ),
-            {},
-        )
-        for stage, use in record.stages.items()
-    }
+    read: dict[str, dict[str, str]] = {}
+    for stage, use in record.stages.items():
+        paths = (root / stage / use.key / INGREDIENTS for root in (runs.store, runs.published))
+        read[stage] = next((read_json(path).get("inputs", {}) for path in paths if path.is_file()), {})
     found: list[str] = []
     while more := [
         stage
