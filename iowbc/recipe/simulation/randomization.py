@@ -44,7 +44,8 @@ class Randomization(Section):
     """Domain randomization: quantities drawn at the start of each episode."""
 
     enabled: bool = True
-    """Enable the randomization; otherwise every entry has its nominal value."""
+    """Enable the randomization; otherwise every entry has its nominal value. The curriculum scales an object's mass in
+    any case."""
     object_mass_scale: Distribution = Distribution(low=0.07, high=1.5, nominal=1.0)
     """Object mass relative to the nominal one: from a 0.5 kg box and a 5 kg crate, the lightest loads of the trials, to
     150 %. Table I has 50 to 150 %."""
