@@ -66,7 +66,11 @@ def run(job: Job) -> None:
     teachers, abouts = zip(*(load_network(folder, ("teacher",)) for folder in folders), strict=True)
     about = abouts[0]
     with closing(training_environments(job, count=settings.environments, seed=seed + 1)) as environments:
-        environments.set_curriculum(about["curriculum"])
+        levels = dict(about["curriculum"]["levels"])
+        for scene, folder in folder_of.items():  # each scene those of its own expert
+            known = abouts[folders.index(folder)].get("curriculum", {"levels": {}})["levels"]
+            levels |= {scene: known[scene]} if scene in known else {}
+        environments.set_curriculum({"levels": levels})
         layout = environments.layout
         own = dict(zip(layout.extra.names, layout.extra.mirrors, strict=True))
         seen = observation_layout(robot, recipe.task.observation.observe_object and settings.observe_object)

@@ -4,6 +4,7 @@ import dataclasses
 import json
 import os
 import runpy
+import shutil
 import subprocess
 import sys
 from contextlib import closing
@@ -40,6 +41,7 @@ from iowbc.task.gym.environment import Environment
 from iowbc.task.layout import full_layout
 from iowbc.task.specification import Specification
 from iowbc.task.vector.setup import Setup
+from iowbc.task.vector.vector_env import VectorEnv
 from iowbc.task.vector.worker import Message
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -371,6 +373,31 @@ def test_experts_of_every_scene_that_are_one_teacher_make_the_student_of_that_te
     assert left == (trained / "distill" / "out" / "student.safetensors").read_bytes()
     assert "teacher" not in distill.STAGE.reads(recipe)
     assert {one.named for one in distill.STAGE.borrows(recipe).values()} == {"a.yaml", "b.yaml"}
+
+
+def test_each_scene_begins_at_the_levels_of_its_own_expert(
+    trained: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recipe = changed(small_recipe(), "distill.experts", {"free": "a.yaml", "lift": "b.yaml"})
+    recipe = changed(recipe, "distill.environments", 8)
+    inputs, given = {}, []
+    for scene, level in (("free", 0.25), ("lift", 0.75)):
+        inputs[f"expert/{scene}"] = folder = Path(shutil.copytree(trained / "teacher" / "out", tmp_path / scene))
+        about = json.loads((folder / "teacher.json").read_text())
+        levels = about["curriculum"]["levels"].values()
+        about["curriculum"]["levels"] = {
+            name: {axis: [level] for axis in next(iter(levels))} for name in ("free", "lift")
+        }
+        (folder / "teacher.json").write_text(json.dumps(about))
+
+    def stop(environments: VectorEnv, curriculum: dict[str, Any]) -> None:
+        given.append({scene: levels["posture"] for scene, levels in curriculum["levels"].items()})
+        raise Interrupted("seen")
+
+    monkeypatch.setattr(VectorEnv, "set_curriculum", stop)
+    with pytest.raises(Interrupted):
+        distill.STAGE.run(make_job(tmp_path, recipe, inputs=inputs, workers=0))
+    assert given == [{"free": [0.25], "lift": [0.75]}]
 
 
 def test_a_scene_without_an_expert_and_an_expert_without_a_scene_are_refused() -> None:
