@@ -167,14 +167,18 @@ class Planner:
             if record.done and record.total and record.seconds:  # the remaining part at the attempt's rate
                 expected = record.seconds * max(0.0, record.total / record.done - 1.0)
         if not forced:
-            predecessor = self._predecessor(stage, step.ingredients)
+            predecessor = self._predecessor(step)
         if predecessor is not None:
-            notes.append(f"extends {predecessor.manifest.key[:8]}, which ends earlier")
+            changed = changed_code(predecessor.manifest.code, step.code)
+            code = f"; code changed since it was made: {', '.join(changed)}" if changed else ""
+            notes.append(f"extends {predecessor.manifest.key[:8]}, which ends earlier{code}")
             expected = None if expected is None else max(0.0, expected - predecessor.manifest.seconds)
         return replace(step, notes=tuple(notes), expected=expected, predecessor=predecessor)
 
-    def _predecessor(self, stage: Stage, ingredients: Mapping[str, Any]) -> Artifact | None:
-        """The undamaged artifact that differs only in a smaller `stage.extends`; of several the longest."""
+    def _predecessor(self, step: StagePlan) -> Artifact | None:
+        """The undamaged artifact that differs only in a smaller `stage.extends`; of several the longest. None with
+        other code where that is to run again."""
+        stage, ingredients, rerun = step.stage, step.ingredients, self.options.on_code_change == "rerun"
         if stage.extends is None:
             return None
         aim = slice_value(self.deciding, stage.extends, stage)
@@ -184,6 +188,7 @@ class Planner:
             changes = list(differences(nested(old.get("recipe", {})), nested(ingredients["recipe"])))
             alike = all(old.get(name) == ingredients[name] for name in ("version", "inputs", "robot"))
             there = not set(stage.extends_from) & set(artifact.manifest.omitted)
+            there = there and not (rerun and changed_code(artifact.manifest.code, step.code))
             if alike and there and [path for path, _, _ in changes] == [stage.extends] and changes[0][1] < aim:
                 ends[changes[0][1]] = artifact
         for end in sorted(ends, reverse=True):

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
+import pytest
 from workplace import Workplace
 
 from iowbc.pipeline.stage import Job
@@ -49,3 +50,15 @@ def test_nothing_else_may_differ_and_the_end_must_be_later(workplace: Workplace)
     assert workplace.plan("teacher.steps=8192", "teacher.gamma=0.9")["teacher"].predecessor is None
     assert workplace.plan("teacher.steps=2048")["teacher"].predecessor is None
     assert workplace.plan("teacher.steps=8192", force=frozenset({"teacher"}))["teacher"].predecessor is None
+
+
+def test_a_training_by_other_code_is_extended_with_a_note_or_not_where_code_is_to_run_again(
+    workplace: Workplace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    extending(workplace)
+    first = workplace.run()["teacher"]
+    monkeypatch.setattr("iowbc.pipeline.planner.changed_code", lambda old, new: ["learning"])
+    step = workplace.plan("teacher.steps=8192")["teacher"]
+    assert step.predecessor == first
+    assert any(note.endswith("which ends earlier; code changed since it was made: learning") for note in step.notes)
+    assert workplace.plan("teacher.steps=8192", on_code_change="rerun")["teacher"].predecessor is None
