@@ -24,14 +24,6 @@ def nominal_command(commands: Commands) -> Array:
     return command
 
 
-def within_offsets(wrists: Array, commands: Commands) -> Array:
-    """Offsets of both wrists (n, 6) [m] with their mean and their distances from it in the ranges of training."""
-    single, common = np.array(commands.single_offset), np.array(commands.common_offset)
-    sides = wrists.reshape(-1, 2, 3)
-    shared = sides.mean(axis=1, keepdims=True)
-    return (shared.clip(-common, common) + (sides - shared).clip(-single, single)).reshape(-1, 6)
-
-
 def command_mirror(robot: Robot) -> MirrorMap:
     """Mirror of the command, (11,): v_y, yaw rate and the y offsets change sign, the wrists change sides."""
     permutation = np.array([0, 1, 2, 3, 4, 8, 9, 10, 5, 6, 7])

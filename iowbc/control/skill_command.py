@@ -3,7 +3,7 @@
 import numpy as np
 
 from iowbc.arrays import Array, Mask
-from iowbc.control.command import HEIGHT, OFFSET, PITCH, VELOCITY, YAW_RATE, nominal_command, within_offsets
+from iowbc.control.command import HEIGHT, OFFSET, PITCH, VELOCITY, YAW_RATE, nominal_command
 from iowbc.recipe.skill.skill import RobotAgent
 from iowbc.recipe.task.commands import Commands
 
@@ -45,7 +45,11 @@ class SkillCommand:
         command[:, VELOCITY] = command[:, VELOCITY].clip(self._low, self._high)
         command[:, HEIGHT] = command[:, HEIGHT].clip(*self._commands.height)
         command[:, PITCH] = command[:, PITCH].clip(*self._commands.pitch)
-        command[:, OFFSET] = within_offsets(command[:, OFFSET], self._commands)
+        wrists = command[:, OFFSET].reshape(-1, 2, 3)
+        shared = wrists.mean(axis=1, keepdims=True)
+        single, common = np.array(self._commands.single_offset), np.array(self._commands.common_offset)
+        wrists = shared.clip(-common, common) + (wrists - shared).clip(-single, single)
+        command[:, OFFSET] = wrists.reshape(-1, 6)
         return command
 
     def action_of(self, command: Array, nominal: Array) -> Array:

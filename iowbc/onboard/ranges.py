@@ -3,7 +3,7 @@
 import numpy as np
 
 from iowbc.arrays import Array
-from iowbc.control.command import HEIGHT, OFFSET, PITCH, VELOCITY, nominal_command, within_offsets
+from iowbc.control.command import HEIGHT, OFFSET, PITCH, VELOCITY, nominal_command
 from iowbc.control.gait import wants_to_move
 from iowbc.control.sensors import quantities
 from iowbc.deploy.contract import Contract
@@ -22,12 +22,12 @@ class Ranges:
         """Sizes of the object's measurements that the controller observes, by name."""
 
     def clipped(self, command: Array) -> Array:
-        """The command within the ranges, (11,). A walking robot bows less than a standing one, and wrists keep the
-        greatest distance from each other that training has."""
+        """The command within the ranges, (11,); a walking robot bows less than a standing one."""
         known, found = self._known, command.copy()
         found[VELOCITY] = command[VELOCITY].clip(*self.velocity)
         found[HEIGHT] = command[HEIGHT].clip(*known.height)
         walking = wants_to_move(found[None], self._gait)[0]
         found[PITCH] = command[PITCH].clip(*(known.pitch if walking else known.deep_pitch))
-        found[OFFSET] = within_offsets(command[None, OFFSET], known)
+        offset = np.tile(np.add(known.common_offset, known.single_offset), 2)
+        found[OFFSET] = command[OFFSET].clip(-offset, offset)
         return found

@@ -105,21 +105,18 @@ def _of_one_variant(first: Run, second: Run) -> bool:
     recipe = _seedless(first.recipe)
     if recipe and recipe == _seedless(second.recipe):
         return True
-    shared = first.artifacts.keys() & second.artifacts.keys()
-    decided = [
-        [_seedless(run.artifacts[stage].ingredients.get("recipe", {})) for stage in shared] for run in (first, second)
-    ]
-    if "eval" not in shared or not all(decided[0]) or decided[0] != decided[1]:
-        return False
-    (label, seeds, robots), other = (
-        (
-            run.recipe.get("eval", {}).get("label"),
-            [flattened(run.recipe).get(path) for path in SEEDS],
-            [run.artifacts[stage].ingredients.get("robot") for stage in shared],
-        )
-        for run in (first, second)
-    )
-    return label == other[0] and seeds != other[1] and robots == other[2]
+    shared = sorted(first.artifacts.keys() & second.artifacts.keys())
+
+    def made(run: Run) -> tuple[tuple[Any, ...], list[Any]]:
+        """What must be equal, the last part not empty, and seeds."""
+        keyed = [run.artifacts[stage].ingredients for stage in shared]
+        recipes = [one.get("recipe", {}) for one in keyed]
+        seeds = [flattened(one).get(path) for one in recipes for path in SEEDS]
+        label, robots = run.recipe.get("eval", {}).get("label"), [one.get("robot") for one in keyed]
+        return (label, robots, [_seedless(one) for one in recipes]), seeds
+
+    (alike, seeds), (other, others) = made(first), made(second)
+    return "eval" in shared and all(alike[-1]) and alike == other and seeds != others
 
 
 def _seedless(recipe: Mapping[str, Any]) -> dict[str, Any]:

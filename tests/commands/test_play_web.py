@@ -27,7 +27,7 @@ def test_a_page_is_no_film(tmp_path: Path) -> None:
 def test_without_viser_the_command_that_installs_it_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     found = options.find_spec
     monkeypatch.setattr(options, "find_spec", lambda name: None if name == "viser" else found(name))
-    with pytest.raises(UsageError, match=r"pip install 'iowbc\[web\]'"):
+    with pytest.raises(UsageError, match=r"pip install '\.\[web\]'"):
         play("first", web=True, port=8080, runs=tmp_path)
 
 
