@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+import yaml
 from stand_ins import deploy_folder, holosoma_file, linear
 
 from iowbc.adapters.networks import network
@@ -110,6 +111,17 @@ def test_an_observation_that_is_not_read_is_named(tmp_path: Path) -> None:
     text = (folder / "deploy.yaml").read_text()
     (folder / "deploy.yaml").write_text(text.replace("last_action", "height_scan"))
     with pytest.raises(StageFailed, match="the observation 'height_scan' is not read; there are: base_ang_vel"):
+        load_adapter(controller(folder, adapter="deploy"))
+
+
+@pytest.mark.parametrize(
+    ("entry", "value"), [("step_dt", 0), ("observations", {"concatenate": True}), ("joint_ids_map", [-1, *range(28)])]
+)
+def test_a_configuration_of_other_values_is_refused(tmp_path: Path, entry: str, value: object) -> None:
+    folder = deploy_folder(tmp_path / "v0", list(range(29)))
+    said = yaml.safe_load((folder / "deploy.yaml").read_text())
+    (folder / "deploy.yaml").write_text(yaml.safe_dump(said | {entry: value}))
+    with pytest.raises(StageFailed, match=r"deploy\.yaml describes no controller of joint positions"):
         load_adapter(controller(folder, adapter="deploy"))
 
 

@@ -239,6 +239,15 @@ def test_variants_meet_the_same_trials_in_a_pinned_world(student: Path, tmp_path
     assert not own["drawn_ground_friction"].equals(other["drawn_ground_friction"]), "each in its own training's world"
 
 
+def test_batches_from_before_a_change_of_the_label_have_the_new_one(student: Path, tmp_path: Path) -> None:
+    asked = {"trials": 2, "sequence": [{"duration": 0.06, "ramp": 0.0}], "lifting": {"masses": [4]}}
+    for label in ("before", "after"):
+        question = {"name": "made-up", "task": {"references": {"use_rg": False}}, "eval": {**asked, "label": label}}
+        world = evaluated_world(Specification(Recipe.model_validate(question), robot_folder("g1")))
+        trials = Protocol(world, load_policy(student), work=tmp_path, workers=0).run()
+        assert set(trials["variant"]) == {label}
+
+
 def test_the_quick_evaluation_plays_the_same_trials_again(recipe: Recipe, student: Path) -> None:
     world = Specification(recipe, robot_folder("g1"))
     trials = quick_trials(world, "lift", masses=(0.0, 4.0), count=1, seed=7)
