@@ -2,7 +2,7 @@
 
 import shutil
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
 from secrets import token_hex
@@ -93,8 +93,7 @@ def _to_remove(
         last = {artifact.manifest.key for name in known for artifact in last_used(store, name).values()}
         limit = time.time() - older_than * DAY if older_than else 0.0
         spared = last | {key for name in known for key, used in ever_used(runs, name).items() if used >= limit}
-        borrowed = {digest for one in own if one.manifest.key in spared for digest in _borrowed(one.ingredients)}
-        spared |= {one.manifest.key for one in own if one.manifest.digest in borrowed}
+        spared |= _lent(own, spared)
         for artifact in free:
             if artifact.manifest.key not in spared and artifact.manifest.seconds < LONG_STAGE:
                 yield artifact.folder
@@ -104,8 +103,7 @@ def _to_remove(
             if not restorable and not holder(runs, key) and not holder(runs, PUBLISHING):
                 yield path
     others = {key for name in known if name not in recipes for key in ever_used(runs, name)}
-    borrowed = {digest for one in own if one.manifest.key in others for digest in _borrowed(one.ingredients)}
-    others |= {one.manifest.key for one in own if one.manifest.digest in borrowed}
+    others |= _lent(own, others)
     for recipe in recipes:
         keys = ever_used(runs, recipe).keys() - others
         yield from (artifact.folder for artifact in free if artifact.manifest.key in keys)
@@ -125,6 +123,12 @@ def _reads(attempt: Mapping[str, Any], artifact: Artifact) -> bool:
     """True if an attempt with these ingredients reads an artifact, from its own recipe or from that of another one."""
     stage, digest = artifact.manifest.stage, artifact.manifest.digest
     return attempt.get("inputs", {}).get(stage) == digest or digest in _borrowed(attempt)
+
+
+def _lent(own: Sequence[Artifact], keys: Collection[str]) -> set[str]:
+    """Keys of the artifacts that those with `keys` borrow from other recipes."""
+    borrowed = {digest for one in own if one.manifest.key in keys for digest in _borrowed(one.ingredients)}
+    return {one.manifest.key for one in own if one.manifest.digest in borrowed}
 
 
 def _borrowed(ingredients: Mapping[str, Any]) -> set[str]:

@@ -106,8 +106,8 @@ class Planner:
         return found[0]
 
     def decide(self, stage: Stage, inputs: Mapping[str, Artifact | None], *, whole: bool = False) -> StagePlan:
-        """The plan for a stage with these inputs; None is an input that would be made anew. whole: a published artifact
-        without large files does not do, as of the last stage with `self.whole`."""
+        """The plan for a stage with these inputs; None is an input that would be made anew. whole: require
+        all results, as the last stage with `self.whole` does; a published artifact may lack large ones."""
         whole = whole or (self.whole and stage is self.stages[-1])
         unknown = [name for name, artifact in inputs.items() if artifact is None]
         ingredients = {

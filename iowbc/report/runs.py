@@ -108,7 +108,7 @@ def _of_one_variant(first: Run, second: Run) -> bool:
     shared = sorted(first.artifacts.keys() & second.artifacts.keys())
 
     def made(run: Run) -> tuple[tuple[Any, ...], list[Any]]:
-        """What must be equal, the last part not empty, and seeds."""
+        """Label, robots and recipes without seeds, which must be equal; and the seeds."""
         keyed = [run.artifacts[stage].ingredients for stage in shared]
         recipes = [one.get("recipe", {}) for one in keyed]
         seeds = [flattened(one).get(path) for one in recipes for path in SEEDS]

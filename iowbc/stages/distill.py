@@ -69,7 +69,8 @@ def run(job: Job) -> None:
         levels = dict(about["curriculum"]["levels"])
         for scene, folder in folder_of.items():  # each scene those of its own expert
             known = abouts[folders.index(folder)].get("curriculum", {"levels": {}})["levels"]
-            levels |= {scene: known[scene]} if scene in known else {}
+            if scene in known:
+                levels[scene] = known[scene]
         environments.set_curriculum({"levels": levels})
         layout = environments.layout
         own = dict(zip(layout.extra.names, layout.extra.mirrors, strict=True))

@@ -12,10 +12,12 @@ from pydantic import BaseModel
 from iowbc.errors import Damaged, UsageError
 from iowbc.files import write_whole
 from iowbc.pipeline.console.wording import KEY_LENGTH
-from iowbc.pipeline.store.artifact import INGREDIENTS, MANIFEST, RECIPE, Artifact
+from iowbc.pipeline.store.artifact import MANIFEST, RECIPE, Artifact
 from iowbc.pipeline.store.locks import lock_path, named_lock
 from iowbc.pipeline.store.runs import Runs, read_json, read_record
+from iowbc.pipeline.store.store import Store
 from iowbc.recipe.reading.loading import LoadedRecipe
+from iowbc.recipe.recipe import PIPELINE
 
 
 class Use(BaseModel):
@@ -70,21 +72,12 @@ def remember(runs: Runs, loaded: LoadedRecipe, artifact: Artifact) -> None:
 
 def _outdated(runs: Runs, record: LastUsed, artifact: Artifact) -> list[str]:
     """Stages of a record that were made from another artifact of this one's stage, or from such a stage."""
-    read: dict[str, dict[str, str]] = {}
-    for stage, use in record.stages.items():
-        paths = (root / stage / use.key / INGREDIENTS for root in (runs.store, runs.published))
-        read[stage] = next((read_json(path).get("inputs", {}) for path in paths if path.is_file()), {})
-    found: list[str] = []
-    while more := [
-        stage
-        for stage, inputs in read.items()
-        if stage not in found
-        and (
-            inputs.get(artifact.manifest.stage, artifact.manifest.digest) != artifact.manifest.digest
-            or inputs.keys() & {*found}
-        )
-    ]:
-        found += more
+    store, made, found = Store(runs), artifact.manifest, list[str]()
+    for stage in PIPELINE:
+        if stage in record.stages and (used := store.find_any(stage, record.stages[stage].key)) is not None:
+            inputs = used.ingredients.get("inputs", {})
+            if inputs.get(made.stage, made.digest) != made.digest or inputs.keys() & {*found}:
+                found.append(stage)
     return found
 
 
