@@ -31,7 +31,7 @@ from iowbc.reference.labels.labelling import LabelTask
 from iowbc.reference.labels.pool import label_all
 from iowbc.robot.description import load_robot, robot_folder
 from iowbc.rollouts.blocks import block_size
-from iowbc.rollouts.rollout_policies import ExploringPolicy
+from iowbc.rollouts.rollout import ExploringPolicy
 from iowbc.stages.environments import RemoteWorkers
 from iowbc.stages.eval import play_everywhere
 from iowbc.stages.rg_dataset import CHUNK, SHARES, label_everywhere

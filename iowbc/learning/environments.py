@@ -6,8 +6,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from iowbc.rollouts.rollout_policies import RolloutPolicy
-from iowbc.rollouts.trajectories import Trajectories
+from iowbc.rollouts.rollout import RolloutPolicy, Trajectories
 
 
 class Environments(Protocol):

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnvWrapper
 
 from iowbc.rollouts.policies import History
-from iowbc.rollouts.rollout_policies import ExploringPolicy, Past
-from iowbc.rollouts.trajectories import Trajectories
+from iowbc.rollouts.rollout import ExploringPolicy, Past, Trajectories
 
 
 class HistoryEnvironments(VecEnvWrapper):  # type: ignore[misc]

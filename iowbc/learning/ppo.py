@@ -33,8 +33,7 @@ from iowbc.learning.rollout import Samples
 from iowbc.recipe.skill.skill import SkillLearning
 from iowbc.recipe.teacher import Teacher
 from iowbc.rollouts.blocks import block_size
-from iowbc.rollouts.rollout_policies import ExploringPolicy
-from iowbc.rollouts.trajectories import Trajectories
+from iowbc.rollouts.rollout import ExploringPolicy, Trajectories
 
 FIGURES = ("policy_loss", "value_loss", "kl", "approx_kl", "clip_share")
 """Means over all minibatches; over those of the last epoch for `kl` and `approx_kl`."""

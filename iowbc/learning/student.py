@@ -19,7 +19,7 @@ from iowbc.recipe.distillation import Distillation
 from iowbc.robot.mirror import MirrorMap
 from iowbc.rollouts.blocks import block_size
 from iowbc.rollouts.policies import History
-from iowbc.rollouts.rollout_policies import DaggerPolicy, Past
+from iowbc.rollouts.rollout import DaggerPolicy, Past
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,7 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from iowbc.recipe.teacher import Teacher
 from iowbc.robot.mirror import MirrorMap
-from iowbc.rollouts.rollout_policies import RolloutPolicy
-from iowbc.rollouts.trajectories import Trajectories, roll
+from iowbc.rollouts.rollout import RolloutPolicy, Trajectories, roll
 
 MIRRORS = (
     MirrorMap(np.array([0, 1, 2]), np.array([-1, -1, 1], np.float32)),

@@ -18,7 +18,7 @@ from iowbc.learning.networks import StudentNetwork
 from iowbc.learning.teacher import TeacherTraining
 from iowbc.recipe.teacher import HistoryNetwork, Teacher
 from iowbc.robot.mirror import MirrorMap
-from iowbc.rollouts.rollout_policies import ExploringPolicy
+from iowbc.rollouts.rollout import ExploringPolicy
 
 pytestmark = pytest.mark.integration
 

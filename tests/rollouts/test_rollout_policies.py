@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from iowbc.rollouts.policies import HistoryEncoder, HistoryPolicy, Layers, Linear, Normal, RowPolicy
-from iowbc.rollouts.rollout_policies import DaggerPolicy, ExploringPolicy, Past, RolloutPolicy
+from iowbc.rollouts.rollout import DaggerPolicy, ExploringPolicy, Past, RolloutPolicy
 
 ENVIRONMENTS, LENGTH, STATE, TOLD, ACTIONS, BLOCK, STEPS = 10, 4, 3, 2, 2, 2, 6
 ROUNDING = {"rtol": 1e-6, "atol": 1e-5}

@@ -16,8 +16,7 @@ from faulty import StepBy
 from iowbc.errors import WorkerFailed
 from iowbc.rollouts.blocks import block_size
 from iowbc.rollouts.policies import Layers, Linear, Normal, RowPolicy
-from iowbc.rollouts.rollout_policies import ExploringPolicy
-from iowbc.rollouts.trajectories import Trajectories
+from iowbc.rollouts.rollout import ExploringPolicy, Trajectories
 from iowbc.task.batch import Batch
 from iowbc.task.vector.vector_env import VectorEnv
 from iowbc.task.vector.worker import Message

@@ -12,8 +12,7 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from iowbc.arrays import Array
 from iowbc.robot.description import load_robot
-from iowbc.rollouts.rollout_policies import RolloutPolicy
-from iowbc.rollouts.trajectories import Trajectories, roll, side_by_side
+from iowbc.rollouts.rollout import RolloutPolicy, Trajectories, roll, side_by_side
 from iowbc.task.batch import Batch
 from iowbc.task.curriculum import AXES
 from iowbc.task.episodes import Episode
