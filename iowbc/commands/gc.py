@@ -19,9 +19,8 @@ from iowbc.files import OLD
 from iowbc.pipeline.store.artifact import INGREDIENTS, Artifact
 from iowbc.pipeline.store.last_used import ever_used, record_path, remove_dangling
 from iowbc.pipeline.store.locks import holder
-from iowbc.pipeline.store.publishing import PUBLISHING
 from iowbc.pipeline.store.runs import Runs, read_json, require_writable_runs
-from iowbc.pipeline.store.store import Store
+from iowbc.pipeline.store.store import PUBLISHING, Store
 from iowbc.pipeline.store.workspace import unfinished
 from iowbc.pipeline.tracking.journal import Journal, sent_path, unsent
 from iowbc.stages.registry import STAGES

@@ -10,9 +10,11 @@ from iowbc.commands.printed import shown_path, stdout_console, tell
 from iowbc.commands.request import Request, planners
 from iowbc.errors import UsageError
 from iowbc.pipeline.stage_plan import Options
-from iowbc.pipeline.store.publishing import LARGEST_REPOSITORY, published_size
-from iowbc.pipeline.store.publishing import publish as copied
 from iowbc.pipeline.store.runs import Runs, require_writable_runs
+from iowbc.pipeline.store.store import Store
+
+LARGEST_REPOSITORY = 45_000_000
+"""Maximum size of all published files [bytes], so that cloning stays fast."""
 
 
 def publish(
@@ -54,12 +56,12 @@ def publish(
             raise UsageError(f"--without {name}: no artifact has such a file; files: {', '.join(sorted(names))}")
     for key, artifact in artifacts.items():
         to_leave_out = set(without) & set(artifact.manifest.files) - set(artifact.manifest.omitted)
-        copy = artifact if artifact.published and not to_leave_out else copied(request.runs, artifact, without)
+        copy = artifact if artifact.published and not to_leave_out else Store(request.runs).publish(artifact, without)
         left_out = ", ".join(copy.manifest.omitted)
         lacks = [f"without {left_out}"] if left_out else []
         what = f"{artifact.manifest.stage}: {shown_path(copy.folder)} ({decimal(copy.size)})"
         tell(console, "; ".join([what, *lacks, *notes.get(key, ())]))
-    size = published_size(request.runs)
+    size = sum(path.stat().st_size for path in request.runs.published.rglob("*") if path.is_file())
     console.print(f"{decimal(size)} are published in all", highlight=False)
     if size > LARGEST_REPOSITORY:
         limit = decimal(LARGEST_REPOSITORY)

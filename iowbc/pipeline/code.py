@@ -2,6 +2,7 @@
 
 import ast
 import functools
+import hashlib
 import importlib.metadata
 import platform
 from collections.abc import Iterator, Mapping
@@ -11,8 +12,9 @@ from socket import gethostname
 
 from iowbc.files import file_digest
 from iowbc.pipeline.stage import Stage
-from iowbc.pipeline.store.digests import PACKAGE, content_digest, syntax_digest
+from iowbc.pipeline.store.digests import content_digest
 
+PACKAGE = Path(__file__).parents[1]
 INFRASTRUCTURE = ("pipeline", "errors", "files", "full_disk", "processes")
 """Subpackages and modules that run stages but compute no result; they and their imports are ignored."""
 IN_KEYS = "recipe.recipe"
@@ -38,6 +40,21 @@ def _code_of(own: str) -> Mapping[str, str]:
         part: content_digest({name: syntax_digest(_source(name)) for name in modules if parts[name] == part})
         for part in sorted(set(parts.values()))
     }
+
+
+@functools.cache
+def syntax_digest(source: Path) -> str:
+    """Digest of a module's syntax tree, without comments, docstrings and the sentences under fields."""
+    tree = ast.parse(source.read_bytes(), filename=str(source))
+    for node in ast.walk(tree):
+        if isinstance(body := getattr(node, "body", None), list):
+            body[:] = [statement for statement in body if not _is_text(statement)]
+    return hashlib.sha256(ast.dump(tree).encode()).hexdigest()
+
+
+def _is_text(statement: ast.AST) -> bool:
+    value = statement.value if isinstance(statement, ast.Expr) else None
+    return isinstance(value, ast.Constant) and isinstance(value.value, str)
 
 
 def changed_code(old: Mapping[str, str], new: Mapping[str, str]) -> list[str]:

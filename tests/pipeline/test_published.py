@@ -9,14 +9,15 @@ import pytest
 from workplace import Workplace
 
 from iowbc import files
-from iowbc.pipeline.store import publishing
+from iowbc.commands.publish import LARGEST_REPOSITORY
+from iowbc.pipeline.store import store
 
 
 @pytest.fixture
 def cloned(workplace: Workplace) -> Workplace:
     """All stages are published, and nothing was made here."""
     for artifact in workplace.run().values():
-        publishing.publish(workplace.store.runs, artifact)
+        workplace.store.publish(artifact)
     shutil.rmtree(workplace.store.runs.store)
     workplace.ran()
     return workplace
@@ -58,12 +59,12 @@ def test_what_leaves_out_its_large_files_stands_for_its_digest_alone(
     workplace: Workplace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made = workplace.run()
-    monkeypatch.setattr(publishing, "LARGEST_FILE", 22)
-    copy = publishing.publish(workplace.store.runs, made["rg-fit"])
+    monkeypatch.setattr(store, "LARGEST_FILE", 22)
+    copy = workplace.store.publish(made["rg-fit"])
     assert "result.json" in copy.manifest.omitted
     monkeypatch.undo()
     for name in ("rg-dataset", "teacher", "distill", "eval", "export"):
-        publishing.publish(workplace.store.runs, made[name])
+        workplace.store.publish(made[name])
     for made_here in ("store", "recipes", "small"):
         shutil.rmtree(workplace.store.runs.root / made_here)
     workplace.ran()
@@ -81,9 +82,9 @@ def test_what_leaves_out_its_large_files_stands_for_its_digest_alone(
 
 
 def test_a_missing_record_makes_nothing_anew(workplace: Workplace, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(publishing, "KINDS", (".json",))
+    monkeypatch.setattr(store, "KINDS", (".json",))
     for artifact in workplace.run().values():
-        assert publishing.publish(workplace.store.runs, artifact).manifest.omitted == (
+        assert workplace.store.publish(artifact).manifest.omitted == (
             "figures/curve.png",
             "tables/counts.md",
         )
@@ -96,9 +97,9 @@ def test_a_missing_record_makes_nothing_anew(workplace: Workplace, monkeypatch: 
 def test_a_published_training_is_gone_on_from_unless_it_lacks_what_that_takes(
     workplace: Workplace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(publishing, "KINDS", (".json",))
+    monkeypatch.setattr(store, "KINDS", (".json",))
     for artifact in workplace.run().values():
-        publishing.publish(workplace.store.runs, artifact)
+        workplace.store.publish(artifact)
     shutil.rmtree(workplace.store.runs.store)
     teacher = workplace.registry["teacher"]
     for needed, found in (("result.json", True), ("figures/curve.png", False)):
@@ -136,7 +137,7 @@ def test_publishing_leaves_out_the_files_that_are_named(workplace: Workplace) ->
 
 def test_a_repository_that_grows_too_large_is_warned_of(cloned: Workplace) -> None:
     with (cloned.store.runs.published / "large").open("wb") as large:
-        large.truncate(publishing.LARGEST_REPOSITORY)
+        large.truncate(LARGEST_REPOSITORY)
     done = cloned.command("publish", "small.yaml")
     assert done.code == 0
     assert "warning: a repository should carry no more than 45.0 MB; remove what is out of date" in done.output
@@ -156,7 +157,7 @@ def test_publishing_brings_back_what_a_death_left_and_removes_the_rest(
 
     monkeypatch.setattr(files, "move_folder", dies)
     with pytest.raises(KeyboardInterrupt):
-        publishing.publish(runs, artifact)
+        cloned.store.publish(artifact)
     monkeypatch.undo()
     (teacher.parent / f".{'a' * 64}.4711").mkdir()
     assert {path.name for path in teacher.parent.iterdir()} == {
@@ -169,7 +170,7 @@ def test_publishing_brings_back_what_a_death_left_and_removes_the_rest(
     removed = cloned.command("gc", "--unused").output
     assert removed.count("removed") == 2
     assert f".{teacher.name}.old" not in removed
-    publishing.publish(runs, other)
+    cloned.store.publish(other)
     assert [path.name for path in teacher.parent.iterdir()] == [teacher.name]
     again = published("teacher", teacher.name)
     assert again is not None

@@ -14,7 +14,6 @@ from iowbc.errors import RecipeError
 from iowbc.pipeline.planner import Planner, planner_for
 from iowbc.pipeline.stage import START, Job, Stage
 from iowbc.pipeline.stage_plan import Options, StagePlan
-from iowbc.pipeline.store.publishing import publish
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
 from iowbc.recipe.reading.loading import load_recipe
@@ -81,7 +80,7 @@ def test_what_was_published_without_its_state_begins_one_all_the_same(
 ) -> None:
     first = workplace.run()["teacher"]
     start = f"teacher.start={first.manifest.key}"
-    publish(workplace.store.runs, first, ["started_at.json"])
+    workplace.store.publish(first, ["started_at.json"])
     shutil.rmtree(first.folder)
     second = workplace.run(start, "teacher.gamma=0.9")["teacher"]
     found = workplace.store.find("teacher", first.manifest.key, published=True)
@@ -92,7 +91,7 @@ def test_what_was_published_without_its_state_begins_one_all_the_same(
 
 def test_what_was_published_without_its_results_begins_none_by_its_key(workplace: Workplace) -> None:
     first = workplace.run()["teacher"]
-    publish(workplace.store.runs, first, ["result.json"])
+    workplace.store.publish(first, ["result.json"])
     shutil.rmtree(first.folder)
     assert workplace.plan()["teacher"].cached
     with pytest.raises(RecipeError, match=r"key 'teacher.start' = .*: its published artifact leaves out large files"):
@@ -129,7 +128,7 @@ def test_the_recipe_that_it_begins_from_runs_again_where_it_was_published_withou
     made = workplace.command("run", second, "--until", "teacher")
     assert made.code == 0, made.errors
     for artifact in workplace.store.artifacts("teacher"):
-        publish(workplace.store.runs, artifact, ["result.json"])
+        workplace.store.publish(artifact, ["result.json"])
     shutil.rmtree(workplace.store.runs.store / "teacher")
     assert "all stages are cached" in workplace.command("plan", second, "--until", "teacher").output
     refused = workplace.command("sweep", second, "--until", "teacher", "--set", "teacher.gamma=0.8,0.7")

@@ -1,7 +1,5 @@
-"""Digests: of data, of files, of folders, and of code without its comments and docstrings."""
+"""Digests: of data, of files and of folders."""
 
-import ast
-import functools
 import hashlib
 import json
 from collections.abc import Mapping
@@ -9,8 +7,6 @@ from pathlib import Path
 from typing import Any
 
 from iowbc.files import file_digest
-
-PACKAGE = Path(__file__).parents[2]
 
 
 def data_digest(data: Any) -> str:
@@ -37,21 +33,3 @@ def folder_files(folder: Path) -> list[Path]:
 def folder_digest(folder: Path) -> str:
     """Digest of all files of a folder, names and contents."""
     return content_digest({path.relative_to(folder).as_posix(): file_digest(path) for path in folder_files(folder)})
-
-
-@functools.cache
-def syntax_digest(source: Path) -> str:
-    """Digest of a module's syntax tree, without comments and docstrings."""
-    tree = ast.parse(source.read_bytes(), filename=str(source))
-    for node in ast.walk(tree):
-        if isinstance(body := getattr(node, "body", None), list):
-            body[:] = [statement for statement in body if not _is_text(statement)]
-    return hashlib.sha256(ast.dump(tree).encode()).hexdigest()
-
-
-def _is_text(statement: ast.AST) -> bool:
-    """A bare string: a docstring, or the sentence under a field."""
-    match statement:
-        case ast.Expr(value=ast.Constant(value=str())):
-            return True
-    return False
