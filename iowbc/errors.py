@@ -1,18 +1,4 @@
-"""Every error that iowbc raises on purpose. Each text says what is wrong, where, and what to do next.
-
-IowbcError              a command that raises one prints its text and ends with 1
-├── UsageError          what was asked for cannot be done (2)
-│   ├── RecipeError     a recipe or an override is wrong; holds every problem found
-│   ├── ContractBroken  an exported folder is incomplete, damaged, or of another format
-│   ├── NoRenderer      nothing can be drawn on this machine
-│   └── NoDisplay       the viewer needs a display and there is none
-├── StageFailed         a stage's result misses a gate or could not be made
-├── PipelineFailed      a run ended at a failed stage
-├── Interrupted         asked to stop; what was done is kept (130)
-├── Damaged             a file or an artifact is not what was written
-├── WorkerFailed        a worker process died, hung, or raised
-└── Rejected            a sample of the reference generator has no label
-"""
+"""Every error that iowbc raises on purpose. Each text says what is wrong, where, and what to do next."""
 
 import difflib
 from collections.abc import Iterable, Sequence
@@ -35,7 +21,7 @@ class Problem:
 
 
 class IowbcError(Exception):
-    """Base of all errors that are raised on purpose."""
+    """Base of all errors that are raised on purpose; a command that raises one prints its text."""
 
     exit_code = 1
     """Exit code of a command that raised it."""

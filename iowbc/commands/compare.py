@@ -16,7 +16,7 @@ from iowbc.commands.lookup import COMPARED, FILM, film_of, members_of, named, po
 from iowbc.commands.printed import film_progress, print_json, shown_path, stdout_console, tell
 from iowbc.commands.results import PROBE, TRIALS, evaluated_actor, split_tables
 from iowbc.errors import UsageError
-from iowbc.pipeline.console.live_table import sparkline
+from iowbc.pipeline.console.display import sparkline
 from iowbc.pipeline.nested import flattened
 from iowbc.pipeline.store.last_used import require_whole
 from iowbc.pipeline.store.runs import Runs, require_writable

@@ -15,7 +15,7 @@ from iowbc.commands import completion, options
 from iowbc.commands.lookup import known_recipes, last_used, named
 from iowbc.commands.printed import artifact_data, plain_table, print_json, shown_path, stdout_console, tell
 from iowbc.errors import UsageError, require_known, shown
-from iowbc.pipeline.console.live_table import sparkline
+from iowbc.pipeline.console.display import sparkline
 from iowbc.pipeline.console.wording import KEY_LENGTH, ago, duration, figure
 from iowbc.pipeline.nested import flattened
 from iowbc.pipeline.store.artifact import Artifact

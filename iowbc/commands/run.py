@@ -16,8 +16,7 @@ from iowbc.commands.process import DONE, INTERRUPTED, STAGE_FAILED, RunEnding, i
 from iowbc.commands.request import Request, in_order, planners
 from iowbc.commands.results import main_tables, print_results
 from iowbc.errors import Interrupted, PipelineFailed, UsageError
-from iowbc.pipeline.console.display import Display, PlainDisplay
-from iowbc.pipeline.console.live_table import LiveTable
+from iowbc.pipeline.console.display import Display, LiveTable, PlainDisplay
 from iowbc.pipeline.planner import Planner
 from iowbc.pipeline.runner import Runner
 from iowbc.pipeline.stage_plan import Options

@@ -8,8 +8,7 @@ import time
 import pytest
 from rich.console import Console
 
-from iowbc.pipeline.console.display import CURVE_POINTS, PlainDisplay, StageView
-from iowbc.pipeline.console.live_table import LiveTable, sparkline
+from iowbc.pipeline.console.display import CURVE_POINTS, LiveTable, PlainDisplay, StageView, sparkline
 from iowbc.pipeline.console.wording import short
 from iowbc.pipeline.stop_request import StopRequest
 

@@ -10,8 +10,7 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from iowbc.pipeline.console.display import StageView
-from iowbc.pipeline.console.live_table import STYLES
+from iowbc.pipeline.console.display import STYLES, StageView
 from iowbc.pipeline.console.wording import duration
 
 TAIL = 4096
