@@ -156,6 +156,4 @@ def previous(path: Path) -> Path:
 
 
 def _digest(key: str, content: bytes) -> str:
-    found = hashlib.sha256(key.encode() + b"\n")
-    found.update(content)
-    return found.hexdigest()
+    return hashlib.sha256(key.encode() + b"\n" + content).hexdigest()

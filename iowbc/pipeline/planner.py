@@ -60,7 +60,7 @@ class Planner:
             for name in stage.reads(self.loaded.recipe):
                 step, made = steps[name], steps[name].artifact
                 if not steps[stage.name].cached and step.cached and made is not None and not made.whole:
-                    timed = estimated(step, step.ingredients, self.store.artifacts(name), made)
+                    timed = estimated(step, self.store.artifacts(name), made)
                     steps[name] = replace(timed, reasons=(f"{NOT_WHOLE}; {stage.name} reads it",))
         known[self] = list(steps.values())
         return known[self]
@@ -108,7 +108,6 @@ class Planner:
     def decide(self, stage: Stage, inputs: Mapping[str, Artifact | None], *, whole: bool = False) -> StagePlan:
         """The plan for a stage with these inputs; None is an input that would be made anew. whole: require
         all results, as the last stage with `self.whole` does; a published artifact may lack large ones."""
-        whole = whole or (self.whole and stage is self.stages[-1])
         unknown = [name for name, artifact in inputs.items() if artifact is None]
         ingredients = {
             "stage": stage.name,
@@ -118,21 +117,19 @@ class Planner:
             "robot": self.robot_digest,
         }
         there = {name: artifact for name, artifact in inputs.items() if artifact is not None}
-        step = StagePlan(stage, code=stage_code(stage), inputs=there)
+        step = StagePlan(stage, ingredients=ingredients, inputs=there, code=stage_code(stage))
         if not unknown:
-            keyed = replace(step, key=data_digest(ingredients), ingredients=ingredients)
-            step = self._with_cached_artifact(keyed, whole)
+            keyed = replace(step, key=data_digest(ingredients))
+            step = self._with_cached_artifact(keyed, whole or (self.whole and stage is self.stages[-1]))
             if step.artifact is not None and step.cached:
                 return step
         former = self._closest(stage.name, ingredients)
         if former is not None:
-            step = estimated(step, ingredients, self.store.artifacts(stage.name), former)
-        if unknown:
-            return replace(step, reasons=tuple(self._reasons(ingredients, former, unknown)))
+            step = estimated(step, self.store.artifacts(stage.name), former)
         if step.artifact is None:
-            why = [f"damaged: {step.damage}"] if step.damage else self._reasons(ingredients, former, ())
+            why = [f"damaged: {step.damage}"] if step.damage else self._reasons(ingredients, former, unknown)
             step = replace(step, reasons=(*step.reasons, *why))
-        return self._with_resume_point(step)
+        return step if unknown else self._with_resume_point(step)
 
     def _with_cached_artifact(self, step: StagePlan, whole: bool) -> StagePlan:
         """The plan with the stored, undamaged artifact of its key, the reasons not to use it, and notes."""

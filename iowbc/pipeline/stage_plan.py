@@ -37,6 +37,7 @@ class StagePlan:
     key: str = ""
     """Empty if an input still has to be made."""
     ingredients: Mapping[str, Any] = field(default_factory=dict)
+    """Of the key; None for the digest of an input that still has to be made."""
     inputs: Mapping[str, Artifact] = field(default_factory=dict)
     """Input artifacts that exist."""
     artifact: Artifact | None = None
@@ -76,31 +77,29 @@ class StagePlan:
         return self.roughly if self.expected is None else self.expected
 
 
-def estimated(
-    step: StagePlan, ingredients: Mapping[str, Any], stored: Iterable[Artifact], closest: Artifact
-) -> StagePlan:
+def estimated(step: StagePlan, stored: Iterable[Artifact], closest: Artifact) -> StagePlan:
     """A step with its time: the median of its last runs here that differ in seed and counts alone, else a guess at the
     rate of `closest`, the stored artifact that differs least."""
     made = closest.manifest
     rate_of = made.recipe if made.host == gethostname() else f"{made.recipe} on another machine"
     own = sorted((one for one in stored if one.manifest.host == gethostname()), key=lambda one: -one.manifest.made)
-    reckoned = (_scaled_time(step.stage, one, ingredients) for one in own)
+    reckoned = (_scaled_time(step, one) for one in own)
     times = [seconds for seconds, alike in reckoned if alike][:LAST_RUNS]
     if not times:
-        guess = _scaled_time(step.stage, closest, ingredients)[0]
+        guess = _scaled_time(step, closest)[0]
         return replace(step, roughly=guess, spread=UNSEEN, rate_of=rate_of)
     middle = median(times)
     spread = (UNSEEN[0] * min(times) / middle, UNSEEN[1] * max(times) / middle) if middle else UNSEEN
     return replace(step, expected=middle, spread=spread, rate_of=rate_of)
 
 
-def _scaled_time(stage: Stage, former: Artifact, ingredients: Mapping[str, Any]) -> tuple[float, bool]:
+def _scaled_time(step: StagePlan, former: Artifact) -> tuple[float, bool]:
     """The time that a stage takes at the rate of a stored artifact [s], which is proportional to each of the stage's
     counts, and whether nothing but seed and counts differs."""
     old, seconds = former.ingredients, former.manifest.seconds
-    alike = old.get("version") == ingredients["version"]
-    for path, before, after in differences(nested(old.get("recipe", {})), nested(ingredients["recipe"])):
-        if path in stage.counts and MISSING not in (before, after) and before:
+    alike = old.get("version") == step.ingredients["version"]
+    for path, before, after in differences(nested(old.get("recipe", {})), nested(step.ingredients["recipe"])):
+        if path in step.stage.counts and MISSING not in (before, after) and before:
             seconds *= after / before
         elif path not in SEEDS:
             alike = False

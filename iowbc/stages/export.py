@@ -1,8 +1,8 @@
 """Stage `export`: the control step as an ONNX graph, its contract and golden vectors, checked and tried out."""
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import TYPE_CHECKING
 
 from iowbc.errors import Interrupted, StageFailed
 from iowbc.pipeline.stage import Job, Stage
@@ -10,10 +10,7 @@ from iowbc.recipe.export import Export
 from iowbc.stages.inputs import generator_stage, policy_stage, without_student
 
 if TYPE_CHECKING:
-    from iowbc.deploy.controller import Values
     from iowbc.evaluation.acceptance import Accepted
-    from iowbc.export.graph import ControllerGraph
-    from iowbc.learning.networks import StudentNetwork
 
 
 def run(job: Job) -> None:
@@ -21,18 +18,30 @@ def run(job: Job) -> None:
     import numpy as np
     import torch
 
+    from iowbc.control.observation import OBJECT, observation_layout
+    from iowbc.control.references import ReferenceLayer
     from iowbc.deploy import contract, exported_folder
+    from iowbc.deploy.controller import open_session
+    from iowbc.deploy.controller import run as run_onnx
     from iowbc.deploy.timing import step_seconds
     from iowbc.evaluation.acceptance import golden_inputs, run_acceptance, try_out_network
     from iowbc.export import golden
     from iowbc.export.folder import write_folder
+    from iowbc.export.graph import ControllerGraph
+    from iowbc.export.onnx_graph import run_torch
     from iowbc.learning.acting import policy_of
-    from iowbc.learning.storage import load_student_network
+    from iowbc.learning.storage import load_student_network, require_layout
+    from iowbc.robot.description import load_robot
     from iowbc.task.specification import Specification
 
     torch.set_num_threads(1)  # as on the robot, where the controller uses one thread
-    rg, (student, about) = job.inputs.get("rg-fit"), load_student_network(job.inputs[policy_stage(job.recipe)])
-    graph = _graph(job, student, about)
+    rg, trained = job.inputs.get("rg-fit"), job.inputs[policy_stage(job.recipe)]
+    student, about = load_student_network(trained)
+    robot, task = load_robot(job.robot), job.recipe.task
+    sees_object = OBJECT[0].name in {part["name"] for part in about["layout"]["observation"]}
+    references, layout = ReferenceLayer(robot, task.references, rg), observation_layout(robot, sees_object)
+    require_layout(trained, about, {"observation": layout.describe()})
+    graph = ControllerGraph(student, robot, task, layout, int(about["architecture"]["history"]), references)
     sources = {stage: folder.name for stage, folder in job.inputs.items()} | {"export": job.key}
     statement = write_folder(job.out, graph, job.recipe, rg, sources)
     try:
@@ -42,7 +51,12 @@ def run(job: Job) -> None:
         steps = golden_inputs(world, job.out, job.interrupted)
     except Interrupted as stopped:
         raise Interrupted(f"export: {stopped}; it starts anew, which takes less than a minute") from stopped
-    differences = _parity(graph, golden.stacked(steps), job.out)
+    inputs = golden.stacked(steps)
+    by_graph = golden.played(partial(run_torch, graph.settle), partial(run_torch, graph.step), inputs)
+    golden.write_golden(inputs, by_graph, job.out / exported_folder.GOLDEN)
+    settle, step = (open_session(job.out / name) for name in (exported_folder.SETTLE, exported_folder.STEP))
+    by_onnx = golden.played(partial(run_onnx, settle), partial(run_onnx, step), inputs)
+    differences = golden.largest_difference(by_graph, by_onnx)
     seconds = step_seconds(job.out, job.recipe.export.timing_steps)[:, 0]
     metrics = {
         "parity": max(differences.values()),
@@ -69,36 +83,6 @@ def run(job: Job) -> None:
         differ = metrics[f"errors_differ/{place}"]
         job.report.say(f"{each.sentence}; its errors differ from the torch student's by {differ:.2%} at most")
     _require_gates(job.recipe.export, differences, policy.largest_difference, played)
-
-
-def _graph(job: Job, student: "StudentNetwork", about: Mapping[str, Any]) -> "ControllerGraph":
-    from iowbc.control.observation import OBJECT, observation_layout
-    from iowbc.control.references import ReferenceLayer
-    from iowbc.export.graph import ControllerGraph
-    from iowbc.learning.storage import require_layout
-    from iowbc.robot.description import load_robot
-
-    robot, task = load_robot(job.robot), job.recipe.task
-    sees_object = OBJECT[0].name in {part["name"] for part in about["layout"]["observation"]}
-    references = ReferenceLayer(robot, task.references, job.inputs.get("rg-fit"))
-    layout, history = observation_layout(robot, sees_object), int(about["architecture"]["history"])
-    require_layout(job.inputs[policy_stage(job.recipe)], about, {"observation": layout.describe()})
-    return ControllerGraph(student, robot, task, layout, history, references)
-
-
-def _parity(graph: "ControllerGraph", inputs: "Values", out: Path) -> dict[str, float]:
-    """Largest differences between torch and onnxruntime by output; leaves the golden vectors."""
-    from functools import partial
-
-    from iowbc.deploy import exported_folder
-    from iowbc.deploy.controller import open_session, run
-    from iowbc.export import golden
-    from iowbc.export.onnx_graph import run_torch
-
-    expected = golden.played(partial(run_torch, graph.settle), partial(run_torch, graph.step), inputs)
-    settle, step = (partial(run, open_session(out / name)) for name in (exported_folder.SETTLE, exported_folder.STEP))
-    golden.write_golden(inputs, expected, out / exported_folder.GOLDEN)
-    return golden.largest_difference(expected, golden.played(settle, step, inputs))
 
 
 def _require_gates(

@@ -9,7 +9,7 @@ import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from socket import gethostname
-from typing import Any, BinaryIO
+from typing import Any
 
 from iowbc.pipeline.nested import flattened
 from iowbc.pipeline.store.artifact import INGREDIENTS, RECIPE, Artifact
@@ -210,7 +210,11 @@ def parameters(resolved: Mapping[str, Any]) -> dict[str, str]:
 def start_sender(runs: Runs) -> subprocess.Popen[bytes]:
     """Start the process that sends the journals, in a session of its own so that Ctrl-C does not reach it."""
     runs.tracking.mkdir(parents=True, exist_ok=True)
-    with _log(runs) as log:
+    try:
+        log = (runs.tracking / "sender.log").open("ab")
+    except OSError:
+        log = open(os.devnull, "wb")  # noqa: SIM115 (closed below)
+    with log:
         return subprocess.Popen(
             [sys.executable, "-m", "iowbc.pipeline.tracking.delivery", str(runs.root.absolute())],
             stdin=subprocess.DEVNULL,
@@ -219,14 +223,6 @@ def start_sender(runs: Runs) -> subprocess.Popen[bytes]:
             start_new_session=True,
             env=os.environ | SINGLE_THREADED,
         )
-
-
-def _log(runs: Runs) -> BinaryIO:
-    """The sender's log, or nothing where that cannot be written."""
-    try:
-        return (runs.tracking / "sender.log").open("ab")
-    except OSError:
-        return open(os.devnull, "wb")
 
 
 def backlog(runs: Runs) -> list[Path]:
