@@ -1,4 +1,4 @@
-"""Atomic file writes: a reader, also after a crash during a write, finds either the old content or the new.
+"""Digests, and atomic file writes: a reader, also after a crash during a write, finds the old content or the new.
 
 A checked file is also protected by a checksum: its first line is JSON with the key that it belongs to and the SHA-256
 of key and content.
@@ -10,9 +10,10 @@ import json
 import os
 import shutil
 import stat
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from iowbc.errors import Damaged
 
@@ -95,6 +96,32 @@ def file_digest(path: Path) -> str:
     """SHA-256 of a file's bytes, hexadecimal."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def data_digest(data: Any) -> str:
+    """SHA-256 of the data's canonical JSON (sorted keys, no spaces, ASCII), hexadecimal. Raises ValueError for NaN."""
+    text = json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def content_digest(files: Mapping[str, str]) -> str:
+    """Digest of a set of files from their relative names and digests."""
+    return data_digest(sorted(files.items()))
+
+
+def folder_files(folder: Path) -> list[Path]:
+    """Regular files below a folder in a fixed order, without hidden ones and caches."""
+    found = (path for path in folder.rglob("*") if path.is_file())
+    return sorted(
+        path
+        for path in found
+        if not any(part.startswith(".") or part == "__pycache__" for part in path.relative_to(folder).parts)
+    )
+
+
+def folder_digest(folder: Path) -> str:
+    """Digest of all files of a folder, names and contents."""
+    return content_digest({path.relative_to(folder).as_posix(): file_digest(path) for path in folder_files(folder)})
 
 
 def synchronise(path: Path) -> None:

@@ -4,7 +4,7 @@ import ctypes
 import os
 import signal
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -19,12 +19,10 @@ PARENT_DEATH_SIGNAL = 1
 def available_cores() -> int:
     """Cores that this process may use: its affinity, cut to the container's quota."""
     cores = len(os.sched_getaffinity(0))
-    try:
+    with suppress(OSError, ValueError):
         quota, period = Path("/sys/fs/cgroup/cpu.max").read_text().split()
         if quota != "max":
             cores = min(cores, max(1, round(int(quota) / int(period))))
-    except (OSError, ValueError):
-        pass
     return cores
 
 

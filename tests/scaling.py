@@ -20,10 +20,10 @@ from local_nodes import connected_nodes, spread_over
 from iowbc.benchmarks.standing_generator import generator_of
 from iowbc.evaluation.trials.plan import Trial, planned_sweeps
 from iowbc.evaluation.trials.protocol import Batches
+from iowbc.files import folder_files
 from iowbc.learning.as_numpy import numpy_policy
 from iowbc.learning.networks import TeacherNetwork
 from iowbc.learning.storage import load_teacher, save_network
-from iowbc.pipeline.store.digests import folder_files
 from iowbc.recipe.evaluation.sequences import Segment
 from iowbc.recipe.reading.loading import load_recipe
 from iowbc.recipe.recipe import Recipe

@@ -10,8 +10,7 @@ import typer
 
 from iowbc.commands import options
 from iowbc.errors import UsageError
-from iowbc.files import file_digest
-from iowbc.pipeline.store.digests import data_digest
+from iowbc.files import data_digest, file_digest
 from iowbc.pipeline.store.runs import require_writable
 from iowbc.processes import available_cores
 from iowbc.recipe.reading.loading import load_recipe, recipe_file

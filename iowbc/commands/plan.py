@@ -13,11 +13,11 @@ from rich.text import Text
 from iowbc.commands import options
 from iowbc.commands.printed import hanging, plain_table, print_json, shown_path, stdout_console, tell
 from iowbc.commands.request import Request, in_order, planners
+from iowbc.files import data_digest
 from iowbc.pipeline.console.wording import KEY_LENGTH, duration, short
 from iowbc.pipeline.planner import Planner, Plans
 from iowbc.pipeline.stage import Stage
 from iowbc.pipeline.stage_plan import Options, StagePlan
-from iowbc.pipeline.store.digests import data_digest
 from iowbc.pipeline.store.runs import Runs
 
 REASONS_SHOWN = 8

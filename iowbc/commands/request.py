@@ -7,9 +7,9 @@ from functools import cache
 from pathlib import Path
 
 from iowbc.errors import Problem, RecipeError, UsageError
+from iowbc.files import folder_digest
 from iowbc.pipeline.planner import Planner, Plans, planner_for
 from iowbc.pipeline.stage_plan import Options
-from iowbc.pipeline.store.digests import folder_digest
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
 from iowbc.recipe.reading.loading import LoadedRecipe, load_recipe

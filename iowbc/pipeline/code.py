@@ -10,9 +10,8 @@ from contextlib import suppress
 from pathlib import Path
 from socket import gethostname
 
-from iowbc.files import file_digest
+from iowbc.files import content_digest, file_digest
 from iowbc.pipeline.stage import Stage
-from iowbc.pipeline.store.digests import content_digest
 
 PACKAGE = Path(__file__).parents[1]
 INFRASTRUCTURE = ("pipeline", "errors", "files", "full_disk", "processes")

@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from iowbc.errors import Damaged, Problem, RecipeError, shown
+from iowbc.files import data_digest, folder_digest
 from iowbc.pipeline.code import changed_code, stage_code
 from iowbc.pipeline.nested import MISSING, differences, nested
 from iowbc.pipeline.stage import ExternalInput, Stage, slice_value
 from iowbc.pipeline.stage_plan import Options, StagePlan, estimated
 from iowbc.pipeline.store.artifact import Artifact
-from iowbc.pipeline.store.digests import data_digest, folder_digest
 from iowbc.pipeline.store.runs import read_record
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.store.workspace import PROGRESS, Progress

@@ -34,9 +34,9 @@ import psutil
 from tally import ENDED, Tally, Turn, Undisturbed
 
 from iowbc.errors import Damaged
+from iowbc.files import data_digest, folder_digest
 from iowbc.pipeline.code import PACKAGE
 from iowbc.pipeline.store.artifact import Artifact
-from iowbc.pipeline.store.digests import data_digest, folder_digest
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
 from iowbc.recipe.reading.loading import load_recipe

@@ -12,11 +12,11 @@ pytest.importorskip("ray", reason="the extra `cluster` brings Ray")
 import ray
 
 from iowbc.errors import Damaged, StageFailed
+from iowbc.files import folder_digest
 from iowbc.pipeline.cluster import folders, stage_task
 from iowbc.pipeline.cluster.folders import SharedFolder, files_of, placed, write_files
 from iowbc.pipeline.cluster.stage_task import NodeReport
 from iowbc.pipeline.code import identity, mismatch
-from iowbc.pipeline.store.digests import folder_digest
 
 
 @pytest.fixture

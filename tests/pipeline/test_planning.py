@@ -11,12 +11,12 @@ from workplace import RECIPE, Workplace
 
 from iowbc.commands.plan import time_of
 from iowbc.errors import RecipeError
+from iowbc.files import data_digest
 from iowbc.pipeline import planner as planning
 from iowbc.pipeline.code import stage_code, syntax_digest
 from iowbc.pipeline.console.wording import duration
 from iowbc.pipeline.stage import slice_value
 from iowbc.pipeline.store.artifact import MANIFEST, Manifest, write_manifest
-from iowbc.pipeline.store.digests import data_digest
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.workspace import Workspace
 

@@ -14,8 +14,8 @@ from workplace import Workplace
 
 from iowbc import files
 from iowbc.errors import Damaged, Interrupted, PipelineFailed
+from iowbc.files import data_digest
 from iowbc.pipeline.store.artifact import INGREDIENTS, MANIFEST
-from iowbc.pipeline.store.digests import data_digest
 from iowbc.pipeline.store.last_used import ever_used, record_path
 from iowbc.pipeline.store.locks import key_lock
 from iowbc.pipeline.store.store import Store

@@ -5,8 +5,8 @@ from typing import Any, Literal, get_args, get_origin
 
 import pytest
 
+from iowbc.files import data_digest
 from iowbc.pipeline.stage import slice_value
-from iowbc.pipeline.store.digests import data_digest
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.section import Section, deciding
 from iowbc.stages import eval as evaluate

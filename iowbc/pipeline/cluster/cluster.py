@@ -9,12 +9,12 @@ from typing import Any
 import ray
 
 from iowbc.errors import Interrupted, IowbcError, StageFailed
+from iowbc.files import folder_digest
 from iowbc.pipeline.cluster.folders import Files, SharedFolder, files_of, write_files
 from iowbc.pipeline.cluster.spread import POLL, TRIES, raised
 from iowbc.pipeline.cluster.stage_task import Event, Mailbox, execute, marker
 from iowbc.pipeline.code import identity
 from iowbc.pipeline.stage import Job, Stage
-from iowbc.pipeline.store.digests import folder_digest
 
 ABORT_PATIENCE = 5.0
 """Seconds that Ray has to end a task that is aborted."""

@@ -11,9 +11,8 @@ from typing import Any
 import ray
 
 from iowbc.errors import Damaged, StageFailed
-from iowbc.files import replacing
+from iowbc.files import folder_digest, folder_files, replacing
 from iowbc.pipeline.code import identity, mismatch
-from iowbc.pipeline.store.digests import folder_digest, folder_files
 from iowbc.pipeline.store.locks import named_lock
 
 Files = Mapping[str, bytes]

@@ -11,9 +11,8 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from iowbc.errors import Damaged
-from iowbc.files import file_digest, synchronise, write_whole
+from iowbc.files import content_digest, data_digest, file_digest, synchronise, write_whole
 from iowbc.pipeline.stage import SUMMARY
-from iowbc.pipeline.store.digests import content_digest, data_digest
 from iowbc.pipeline.store.runs import read_json, read_yaml
 
 MANIFEST = "manifest.json"

@@ -11,9 +11,9 @@ from pathlib import Path
 from socket import gethostname
 from typing import Any
 
+from iowbc.files import data_digest
 from iowbc.pipeline.nested import flattened
 from iowbc.pipeline.store.artifact import INGREDIENTS, RECIPE, Artifact
-from iowbc.pipeline.store.digests import data_digest
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.tracking.delivery import tracking_uri
 from iowbc.pipeline.tracking.journal import PARENT, Journal, header, statuses, unsent
