@@ -149,8 +149,9 @@ def run_recipe(
         try:
             tracker = Tracker(request.runs, loaded, within) if loaded.recipe.execution.track else None
             display = _display(loaded, console, lambda: stop.text, manner)
-            execute = None if cluster is None else cluster.run
-            runner = Runner(planner, display, tracker, stop, rest, execute, workers)
+            runner = Runner(planner, display, tracker, stop, rest, workers=workers)
+            if cluster is not None:
+                runner.execute = cluster.run
             runner.run()
             status, ending = "FINISHED", RunEnding(DONE, artifacts=runner.artifacts)
             if tracker is not None:

@@ -69,8 +69,8 @@ class Runner:
     interrupted: Callable[[], bool]
     command: Callable[[], str] = lambda: ""
     """Command that resumes this run after the stages in `made`; recorded with each stage while it runs."""
-    execute: Callable[[Stage, Job], None] | None = None
-    """Function that runs a stage on a cluster, with the same result as here."""
+    execute: Callable[[Stage, Job], None] = lambda stage, job: stage.run(job)
+    """Runs a stage: here, or on a cluster with the same result."""
     workers: int = 0
     """Worker processes of a stage if neither options nor recipe set them; 0: one per core."""
     artifacts: dict[str, Artifact] = field(default_factory=dict)
@@ -192,10 +192,7 @@ class Runner:
             predecessor=None if step.predecessor is None else step.predecessor.folder,
         )
         try:
-            if self.execute is None:
-                stage.run(job)
-            else:
-                self.execute(stage, job)
+            self.execute(stage, job)
             details = {
                 "stage": stage.name,
                 "version": stage.version,

@@ -1,16 +1,12 @@
 """Stage `skill-eval`: trained skills and rivals play the same games; tables and a figure compare them."""
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING
 
 from iowbc.pipeline.stage import ExternalInput, Job, Stage
 from iowbc.recipe.recipe import Recipe
 from iowbc.results.table import write_frame
 from iowbc.stages.inputs import generator_stage, policy_stage, without_student
 from iowbc.stages.skill import GAME
-
-if TYPE_CHECKING:
-    from iowbc.skill.evaluation.games import Competitor
 
 RIVALS = {
     "nominal": "nominal",
@@ -69,27 +65,36 @@ def run(job: Job) -> None:
     from iowbc.pipeline.store.runs import read_yaml
     from iowbc.results.picture import write_figure
     from iowbc.results.table import write_table
-    from iowbc.skill.evaluation.games import on_controller, planned_games, play_batches
+    from iowbc.skill.evaluation.games import Competitor, on_controller, planned_games, play_batches
     from iowbc.skill.evaluation.tables import figure, headline, tables
     from iowbc.skill.lower_layer import load_student
     from iowbc.task.specification import Specification
 
     torch.set_num_threads(1)  # the result must not depend on the machine's cores
-    recipe, skill = job.recipe, job.recipe.skill
+    recipe, skill, asked = job.recipe, job.recipe.skill, job.recipe.skill.eval
     world = Specification(recipe, job.robot, job.inputs.get("rg-fit")).deployed
     student = load_student(job.inputs[policy_stage(recipe)], world)
     human = load_teacher(job.inputs["skill"], "human")[0] if "skill" in job.inputs else None
     lower = {"": (world, student)}
-    for label in skill.eval.controllers:
+    for label in asked.controllers:
         folder, rg = job.inputs[f"{label}/distill"], job.inputs[f"{label}/rg-fit"]
         task, other = Recipe.model_validate(read_yaml(folder / RECIPE)).task, load_student(folder)
         lower[label] = on_controller(world, label, task, other, rg), other
-    planned, competing = planned_games(skill, human is not None), _competitors(job)
+    skills = [(asked.label, "own", "skill", "")] if "skill" in job.inputs else []
+    for label, several in asked.others.items():
+        skills += [(label, str(place), f"{label}/{place}", "") for place in range(len(several))]
+    skills += [(f"{asked.label} on {label}", "own", "skill", label) for label in asked.controllers]
+    competing = [
+        Competitor(label, training, None, load_teacher(job.inputs[name], "robot")[0], controller)
+        for label, training, name, controller in skills
+    ]
+    competing += [Competitor(RIVALS[rule], "", None if rule == "nominal" else rule, None) for rule in asked.rivals]
+    planned = planned_games(skill, human is not None)
     rows: list[pd.DataFrame] = []
     done = 0
     for competitor in competing:
-        asked = (skill.eval, competitor, human, planned, lower[competitor.controller])
-        for batch in play_batches(*asked, job.workers, job.work, job.interrupted):
+        game = (asked, competitor, human, planned, lower[competitor.controller])
+        for batch in play_batches(*game, job.workers, job.work, job.interrupted):
             rows.append(batch)
             done += len(batch)
             job.report.progress(done, len(planned) * len(competing), f"{competitor.label} {competitor.training}")
@@ -101,22 +106,6 @@ def run(job: Job) -> None:
     metrics = headline(games)
     job.report.metrics(metrics, 0)
     job.summarize(metrics | {"games": float(len(games))})
-
-
-def _competitors(job: Job) -> "list[Competitor]":
-    from iowbc.learning.storage import load_teacher
-    from iowbc.skill.evaluation.games import Competitor
-
-    asked = job.recipe.skill.eval
-    skills = [(asked.label, "own", "skill", "")] if "skill" in job.inputs else []
-    for label, several in asked.others.items():
-        skills += [(label, str(place), f"{label}/{place}", "") for place in range(len(several))]
-    skills += [(f"{asked.label} on {label}", "own", "skill", label) for label in asked.controllers]
-    trained = [
-        Competitor(label, training, None, load_teacher(job.inputs[name], "robot")[0], controller)
-        for label, training, name, controller in skills
-    ]
-    return trained + [Competitor(RIVALS[rule], "", None if rule == "nominal" else rule, None) for rule in asked.rivals]
 
 
 STAGE = Stage(
