@@ -51,8 +51,7 @@ class Place:
 
     make: Callable[[], Any]
     actor: Any = None
-    made: bool = False
-    """True once this actor has answered: it holds its state itself."""
+    """Made at the next request where there is none."""
     request: tuple[Any, bool] = (None, True)
     """The message, and whether it changes the state."""
     state: Any = None
@@ -80,8 +79,6 @@ class NodeActorPool:
         self._asked: dict[Any, Place] = {}
         """Members that have not answered yet, by Ray's references to their answers."""
         self._places = [Place(partial(_called, make, arguments, folders)) for arguments in calls]
-        for place in self._places:
-            self._start(place)
 
     @property
     def states(self) -> list[Any]:
@@ -107,15 +104,16 @@ class NodeActorPool:
 
     def close(self) -> None:
         for place in self._places:
-            ray.kill(place.actor)
+            if place.actor is not None:
+                ray.kill(place.actor)
         self._places = []
 
-    def _start(self, place: Place) -> None:
-        place.actor = self._host.options(scheduling_strategy="SPREAD", max_restarts=0).remote(place.make)
-        place.made = False
-
     def _send(self, place: Place) -> None:
-        state = None if place.made else place.state
+        """Send a member its request; a new actor also receives its state, which it then holds itself."""
+        state = None
+        if place.actor is None:
+            place.actor = self._host.options(scheduling_strategy="SPREAD", max_restarts=0).remote(place.make)
+            state = place.state
         self._asked[place.actor.ask.remote(state, *place.request)] = place
 
     def _hear(self, reference: Any) -> None:
@@ -126,19 +124,17 @@ class NodeActorPool:
             if (cause := raised(error)) is not None:
                 who = f"{self._called} {self._places.index(place) + 1} of {len(self._places)}, on {error.ip}"
                 raise WorkerFailed(f"{who}:\n{cause if isinstance(cause, IowbcError) else error}") from None
-            self._remake(place, str(error).strip().splitlines()[0])
+            place.losses += 1
+            if place.losses > TRIES:
+                lost = f"lost a {self._called} {place.losses} times in a row"
+                raise StageFailed(f"{lost}, the last time: {str(error).strip().splitlines()[0]}") from None
+            self._say(f"a {self._called} was lost; another one takes its place")
+            ray.kill(place.actor)
+            place.actor = None
+            self._send(place)
             return
-        place.made, place.losses = True, 0
+        place.losses = 0
         place.state = state if place.request[1] else place.state
-
-    def _remake(self, place: Place, why: str) -> None:
-        place.losses += 1
-        if place.losses > TRIES:
-            raise StageFailed(f"lost a {self._called} {place.losses} times in a row, the last time: {why}")
-        self._say(f"a {self._called} was lost; another one takes its place")
-        ray.kill(place.actor)
-        self._start(place)
-        self._send(place)
 
 
 class NodeSpread:
