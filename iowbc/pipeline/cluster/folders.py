@@ -49,15 +49,20 @@ def write_files(folder: Path, files: Files) -> None:
 def placed(folder: SharedFolder) -> Path:
     """Path of the folder on this machine: the driver's, if visible here, else a local copy.
 
-    The copy is cached for later stages under the folder's own name, which is the key of an artifact. Raises
-    `StageFailed` if code or package versions differ from the driver's, `Damaged` if the transferred content differs.
+    The copy is cached for this user's later stages under the folder's own name, which is the key of an artifact. Raises
+    `StageFailed` if code or package versions differ from the driver's, `Damaged` if the transferred content differs or
+    the cache belongs to another user.
     """
     if different := mismatch(folder.driver, identity()):
         raise StageFailed(f"a node is not as the driver: {different}; install the same on both")
     there = Path(folder.path)
     if not folder.copy and there.is_dir() and folder_digest(there) == folder.digest:
         return there
-    own = _cache() / folder.digest / there.name
+    cache = Path(tempfile.gettempdir(), f"iowbc-{os.getuid()}")
+    cache.mkdir(exist_ok=True, mode=0o700)
+    if cache.stat().st_uid != os.getuid():
+        raise Damaged(f"{cache} belongs to another user, who could change what stages read; remove it, or set TMPDIR")
+    own = cache / "inputs" / folder.digest / there.name
     with named_lock(own.with_name("lock")):  # another task on this machine may fetch the same folder
         if own.is_dir() and folder_digest(own) == folder.digest:
             return own
@@ -68,14 +73,3 @@ def placed(folder: SharedFolder) -> Path:
             if folder_digest(fresh) != folder.digest:
                 raise Damaged(f"{folder.path} differs from its digest after its way through Ray's object store")
     return own
-
-
-def _cache() -> Path:
-    """This user's cache of fetched folders. Raises `Damaged` if it belongs to another user."""
-    own = Path(tempfile.gettempdir(), f"iowbc-{os.getuid()}")
-    own.mkdir(exist_ok=True, mode=0o700)
-    if own.stat().st_uid != os.getuid():
-        raise Damaged(f"{own} belongs to another user, who could change what stages read; remove it, or set TMPDIR")
-    folder = own / "inputs"
-    folder.mkdir(exist_ok=True)
-    return folder
