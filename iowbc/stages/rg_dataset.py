@@ -93,7 +93,6 @@ def run(job: Job) -> None:
     job.report.metrics(metrics, 0)
     job.report.say(f"{len(dataset)} of {plan.count} samples have a label; labelling took {seconds:.0f} s here")
     figures = job.out / "figures"
-    figures.mkdir(exist_ok=True)
     dataset_figures(figures, plan, dataset, region, rejected, check)
     try:
         draw_strip(figures / "postures.png", plan)

@@ -54,7 +54,6 @@ def run(job: Job) -> None:
     job.summarize(verdict.metrics, gates=verdict.gates, worst=verdict.worst, samples=samples)
     job.report.metrics(verdict.metrics, fitted.epochs)
     figures = job.out / "figures"
-    figures.mkdir(exist_ok=True)
     error_figures(figures, dataset.support[held], predicted, errors, jumps, rg.fit.gates, network.outputs)
     gentle_figure(figures, plan, feasible, jump, labelled)
     learning_figure(figures, fitted.training_loss, fitted.validation_loss)
