@@ -178,7 +178,7 @@ class Runner:
         if changed:
             self.display.say(f"{stage.name}: code changed since its first attempt: {', '.join(changed)}")
         if self.tracker is not None:
-            self.tracker.stage(stage.name, key, ingredients.get("recipe", {}), earlier is not None)
+            self.tracker.stage(stage.name, key, ingredients["recipe"], earlier is not None, self.artifacts)
         job = Job(
             recipe=self.loaded.recipe,
             key=key,

@@ -86,7 +86,7 @@ class Cluster:
             task=task,
             mailbox=self._mailbox,
         )
-        begun = stopping = False
+        begun = False
         try:
             while True:
                 ready, _ = ray.wait([running], timeout=POLL)
@@ -98,10 +98,9 @@ class Cluster:
                     return output
                 if self.aborted:
                     raise KeyboardInterrupt
-                if job.interrupted() and not begun:
-                    raise Interrupted("waited for a node")
-                if job.interrupted() and not stopping:
-                    stopping = True
+                if job.interrupted():
+                    if not begun:
+                        raise Interrupted("waited for a node")
                     ray.get(self._mailbox.stop.remote(task))
         except ray.exceptions.RayError as error:
             if (cause := raised(error)) is None:

@@ -100,28 +100,24 @@ class Tracker(RunRecord):
         self.within = within
         self._recipe = loaded.recipe
         self._resolved = loaded.recipe.model_dump(mode="json")
-        self._cached: list[tuple[str, Artifact]] = []
-        """Cached stages of a run without a journal: a run is recorded only once a stage of it runs."""
         journal = unfinished_journal(runs, self._recipe.name, data_digest(self._resolved))
         super().__init__(runs, journal, loaded.recipe.execution.tracking_patience)
-
-    @property
-    def _journal(self) -> Journal:
-        """The journal, created on first access."""
-        if self._open is None:
-            name, experiment = self._recipe.name, self._recipe.execution.experiment
-            params, digest = parameters(self._resolved), data_digest(self._resolved)
-            self._open = new_journal(self.runs, name, experiment, digest, params, self.within)
-            for stage, artifact in self._cached:
-                self.finished(stage, artifact, cached=True)
-        return self._open
 
     def send(self) -> None:
         if self.within is None:
             super().send()
 
-    def stage(self, name: str, key: str, slices: Mapping[str, Any], resumed: bool) -> None:
-        """A stage begins to run, or goes on; `slices` is its part of the recipe."""
+    def stage(
+        self, name: str, key: str, slices: Mapping[str, Any], resumed: bool, before: Mapping[str, Artifact]
+    ) -> None:
+        """A stage begins to run, or goes on; `slices` is its part of the recipe. `before`: the artifacts of the stages
+        before it. A run is recorded only once a stage of it runs."""
+        if self._open is None:
+            experiment, params = self._recipe.execution.experiment, parameters(self._resolved)
+            digest = data_digest(self._resolved)
+            self._open = new_journal(self.runs, self._recipe.name, experiment, digest, params, self.within)
+            for cached, artifact in before.items():
+                self.finished(cached, artifact, cached=True)
         tags = {**process_tags(), "iowbc.stage": name, "iowbc.key": key, "iowbc.cached": "false"}
         if resumed and name in statuses(self._journal.path):
             self._journal.write("reopen", id=name, tags={**tags, "iowbc.resumed": "true"})
@@ -137,8 +133,7 @@ class Tracker(RunRecord):
 
     def finished(self, name: str, artifact: Artifact, cached: bool) -> None:
         """A stage has its artifact; a cached one gets a nested run too, where the run makes any."""
-        if cached and self._open is None:
-            self._cached.append((name, artifact))
+        if self._open is None:
             return
         if cached:
             if statuses(self._journal.path).get(name) == "FINISHED":
