@@ -15,11 +15,11 @@ from iowbc.recipe.simulation.holding import FREE
 from iowbc.robot.description import load_robot
 from iowbc.sim.simulation import Simulation
 from iowbc.task.episode_state import PER_ENVIRONMENT_FIELDS, EpisodeState
+from iowbc.task.episodes import PlannedPulls, PlannedPushes
 from iowbc.task.guidance import Guidance
 from iowbc.task.judge import Ending, Judge, Judgement
 from iowbc.task.layout import full_layout
 from iowbc.task.motion import Motion
-from iowbc.task.planned_pushes import PlannedPulls, PlannedPushes
 from iowbc.task.privileged import Truth
 from iowbc.task.record import statistics
 from iowbc.task.record.signals import Recorded, write_signals

@@ -12,9 +12,9 @@ from iowbc.control.command import HEIGHT
 from iowbc.control.references import ReferenceLayer, both_wrists
 from iowbc.control.sensors import Measured
 from iowbc.robot.description import Robot
-from iowbc.task.commands.commander import Commander
-from iowbc.task.commands.script import CommandScript
+from iowbc.task.commands import Commander
 from iowbc.task.episode_state import EpisodeState
+from iowbc.task.episodes import CommandScript
 from iowbc.task.specification import Specification
 
 
