@@ -33,8 +33,9 @@ class ArmKinematics(Constants):
         joints = robot.interaction
         speed = robot.velocity_limit[joints]
         speed = speed if settings.joint_speed is None else np.minimum(speed, settings.joint_speed)
-        limits = (robot.default_position[joints], speed, robot.lower[joints], robot.upper[joints])
-        self._rest, self._speed, self._lower, self._upper = (by_arm(values[None]) for values in limits)
+        self.rest, self.lower, self.upper = robot.default_position[joints], robot.lower[joints], robot.upper[joints]
+        rows = (self.rest, speed, self.lower, self.upper)
+        self._rest, self._speed, self._lower, self._upper = (by_arm(values[None]) for values in rows)
         self._grip = robot.grip_offset.T[:, :, None]
         hinges = self._chain.length
         self._mass, self._moment = np.zeros((hinges, 1, 2, 1)), np.zeros((hinges, 3, 2, 1))
