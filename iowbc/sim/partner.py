@@ -14,9 +14,9 @@ from iowbc.recipe.simulation.scene import Scene
 from iowbc.robot import rotations
 from iowbc.robot.description import GRAVITY
 from iowbc.robot.rotations import TINY
-from iowbc.sim.delay import DelayLine
 from iowbc.sim.shapes import measured
 from iowbc.sim.state import SimulationState
+from iowbc.sim.timing import DelayLine
 
 NOISE_WIDTH = 3
 """Noise columns that the partner uses per step: two for its unsteady force, one for its share."""
