@@ -9,7 +9,7 @@ from iowbc.recipe.simulation.scene import Grasp, Object
 from iowbc.robot import rotations
 from iowbc.robot.description import Robot
 from iowbc.robot.rotations import TINY
-from iowbc.sim.model_index import ModelIndex
+from iowbc.sim.model import ModelIndex
 from iowbc.sim.shapes import measured
 
 

@@ -14,8 +14,8 @@ from iowbc.arrays import Array
 from iowbc.recipe.simulation.scene import Scene
 from iowbc.robot import rotations
 from iowbc.robot.rotations import TINY
+from iowbc.sim.model import ModelIndex
 from iowbc.sim.model_fields import ModelFields
-from iowbc.sim.model_index import ModelIndex
 
 TORQUE_FIRST = [3, 4, 5, 0, 1, 2]
 """Order of MuJoCo's spatial forces."""
