@@ -14,7 +14,7 @@ from iowbc.recipe.simulation.scene import Scene
 from iowbc.robot import rotations
 from iowbc.robot.description import GRAVITY
 from iowbc.robot.rotations import TINY
-from iowbc.sim.shapes import measured
+from iowbc.sim.objects import measured
 from iowbc.sim.state import SimulationState
 from iowbc.sim.timing import DelayLine
 
@@ -211,11 +211,8 @@ class Partner:
         self._height[:] = commanded[:, 3]
         self._line.push(heard)
         wanted = self._line.read()
-        offset, velocity, rate = (
-            rotations.turned_by(self._offset, *self._heading.T),
-            np.empty((len(wanted), 3)),
-            wanted[:, 2],
-        )
+        rate, velocity = wanted[:, 2], np.empty((len(wanted), 3))
+        offset = rotations.turned_by(self._offset, *self._heading.T)
         velocity[:, :2] = rotations.turned_by(wanted[:, :2], *self._heading.T)
         velocity[:, 0] -= rate * offset[:, 1]
         velocity[:, 1] += rate * offset[:, 0]
