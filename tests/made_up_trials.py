@@ -9,7 +9,7 @@ import pandas as pd
 from iowbc.evaluation.report.aggregate import ALL_ERRORS, OVER_ALL_TRIALS, STILL
 from iowbc.evaluation.trials.rollout import Outcome
 from iowbc.recipe.recipe import Recipe
-from iowbc.task.commands.script import CommandScript, CommandSegment
+from iowbc.task.episodes import CommandScript, CommandSegment
 from iowbc.task.record.signals import Trace
 
 DT = 0.02

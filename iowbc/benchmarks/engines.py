@@ -10,7 +10,7 @@ from iowbc.arrays import Array
 from iowbc.recipe.evaluation.evaluation import Drake
 from iowbc.recipe.simulation.simulation import SimulationSettings as Recipe
 from iowbc.robot.description import GRAVITY, Robot, load_robot
-from iowbc.sim.shapes import measured
+from iowbc.sim.objects import measured
 from iowbc.sim.simulation import Simulation
 from iowbc.sim.state import SimulationState
 

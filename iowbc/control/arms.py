@@ -1,20 +1,14 @@
-"""Kinematics of both arms, many rows at once: forward, Jacobian, damped differential IK (paper eq. 2, 3)."""
+"""Both arms, many rows at once: forward kinematics, Jacobian, damped differential IK (paper eq. 2, 3), and the torques
+with which they carry their own weight and a load in the hands: a feed-forward for their motors."""
 
 import numpy as np
 
 from iowbc.arrays import Array, Constants, namespace, stacked
-from iowbc.control.chain import Chain, Frames, crossed, product, turn
+from iowbc.control.chain import Chain, Frames, crossed, product, rotated, turn
 from iowbc.recipe.task.joint_references import ArmReference
-from iowbc.robot.description import Robot
-from iowbc.robot.mjcf import Body
+from iowbc.robot.description import GRAVITY, Robot
 
 X, Y = 0, 1
-
-
-def arm_chains(robot: Robot) -> tuple[list[tuple[Body, ...]], tuple[Body, ...]]:
-    """Bodies of both arms from the torso outward, and those from the base to the torso, or the body that moves it."""
-    torso = robot.tree.mover(robot.torso).name
-    return [robot.tree.chain(body, torso) for body in robot.wrist_bodies], robot.tree.chain(torso, robot.base)
 
 
 def by_arm(values: Array) -> Array:
@@ -32,16 +26,23 @@ class ArmKinematics(Constants):
     """Both arms from the torso frame to the wrist sites; joints as in the interaction branch, left, then right."""
 
     def __init__(self, robot: Robot, settings: ArmReference | None = None) -> None:
-        chains, waist = arm_chains(robot)
-        self.rest = robot.default_position[robot.interaction]
+        torso = robot.tree.mover(robot.torso).name
+        chains = [robot.tree.chain(body, torso) for body in robot.wrist_bodies]
+        self._chain, self._waist = Chain(chains), Chain([robot.tree.chain(torso, robot.base)])
         self.settings = settings = settings or ArmReference()
-        own = robot.velocity_limit[robot.interaction]
-        speed = own if settings.joint_speed is None else np.minimum(own, settings.joint_speed)
-        self._rest, self._speed = by_arm(self.rest[None]), by_arm(speed[None])
-        self.lower, self.upper = robot.lower[robot.interaction], robot.upper[robot.interaction]
-        self._lower, self._upper = by_arm(self.lower[None]), by_arm(self.upper[None])
-        self._chain, self._waist = Chain(chains), Chain([waist])
+        joints = robot.interaction
+        speed = robot.velocity_limit[joints]
+        speed = speed if settings.joint_speed is None else np.minimum(speed, settings.joint_speed)
+        self.rest, self.lower, self.upper = robot.default_position[joints], robot.lower[joints], robot.upper[joints]
+        rows = (self.rest, speed, self.lower, self.upper)
+        self._rest, self._speed, self._lower, self._upper = (by_arm(values[None]) for values in rows)
         self._grip = robot.grip_offset.T[:, :, None]
+        hinges = self._chain.length
+        self._mass, self._moment = np.zeros((hinges, 1, 2, 1)), np.zeros((hinges, 3, 2, 1))
+        for side, chain in enumerate(chains):
+            for place, body in enumerate(body for body in chain if body.hinge is not None):
+                self._mass[place, :, side], self._moment[place, :, side, 0] = robot.tree.rigid_mass(body.name)
+        self._outward = np.cumsum(self._mass[::-1], axis=0)[::-1].copy()
         self._identity = np.eye(3)[:, :, None, None]
 
     def forward(self, arm_position: Array, frames: Frames | None = None) -> tuple[Array, Array]:
@@ -83,6 +84,31 @@ class ArmKinematics(Constants):
         for _ in range(steps):
             arm_position = self.solve_step(arm_position, target, dt)
         return arm_position
+
+    def torque(
+        self, arms: Array, waist: Array, gravity: Array, load: Array | None = None, frames: Frames | None = None
+    ) -> Array:
+        """Motor torques that hold the arms still, (n, arms) [N·m], in the order of the interaction branch.
+
+        `arms` (n, arms) and `waist` (n, waist joints) positions [rad], measured or reference; `gravity` (n, 3): its
+        direction in the base frame, (0, 0, -1) when upright; `load` (n, 2), or (n, 1) where it is the same on both:
+        mass that hangs on each grip point [kg]; `frames` of `arms`, where they are known.
+
+        The torque of hinge i is -(a_i × Σ_k m_k (c_k - o_i))·g over the links k from i outward, with its axis a_i and
+        origin o_i and the links' centres c_k; the load's part is Jᵀ of its weight.
+        """
+        xp, frames = namespace(arms), frames or self.frames(arms)
+        down = GRAVITY * self._waist.inward(waist.T[:, None], gravity.T[:, None], directions=True)
+        own = self._mass * frames.origin + rotated(frames.rotation, self._moment)
+        mass, moments = self._outward, [own[-1]]
+        if load is not None:
+            mass = mass + load.T
+            moments = [own[-1] + load.T * frames.end(self._grip)]
+        for hinge in reversed(range(len(own) - 1)):
+            moments.append(moments[-1] + own[hinge])
+        lever = stacked(moments[::-1]) - mass * frames.origin
+        torque = (crossed(xp.swapaxes(frames.axis, 0, 1), xp.swapaxes(lever, 0, 1)) * down[:, None]).sum(0)
+        return by_row(-torque)
 
     def into_torso(self, waist: Array, pelvis_pitch: Array, points: Array) -> Array:
         """Points (n, k, 3) [m] of the heading frame at the base, in the torso frame; see `torso_in_heading`."""

@@ -3,7 +3,6 @@
 import numpy as np
 
 from iowbc.arrays import Array
-from iowbc.control.gravity import ArmGravity
 from iowbc.control.references import ReferenceLayer
 from iowbc.robot.description import Robot
 
@@ -18,7 +17,7 @@ class HandForces:
     def __init__(self, robot: Robot, references: ReferenceLayer, n: int, history: int) -> None:
         self.felt = np.zeros((n, history, 2, 3))
         """Forces on left and right hand in the last decisions, the newest last, heading frame [N]."""
-        self._robot, self._arms, self._gravity = robot, references.arms, ArmGravity(robot)
+        self._robot, self._arms = robot, references.arms
         self._sum = np.zeros((3, n, len(robot.joints)))
         self._count = 0
 
@@ -42,7 +41,7 @@ class HandForces:
         own, waist = self._robot.interaction, position[:, self._robot.waist]
         torque = self._robot.kp[own] * (target - position)[:, own] - self._robot.kd[own] * velocity[:, own]
         frames = self._arms.frames(position[:, own])
-        borne = self._gravity.torque(position[:, own], waist, gravity, frames=frames)
+        borne = self._arms.torque(position[:, own], waist, gravity, frames=frames)
         missing = (borne - torque).reshape(len(position), 2, -1)
         wrists, jacobian = self._arms.forward(position[:, own], frames)
         square = jacobian @ jacobian.swapaxes(2, 3) + DAMPING * np.eye(3)

@@ -14,7 +14,6 @@ from iowbc.control.chain import Frames
 from iowbc.control.command import HEIGHT, OFFSET, PITCH
 from iowbc.control.feasible_map import FEASIBLE, FeasibleMap
 from iowbc.control.feedback import FootPlacement, HipFeedback, LegStretch
-from iowbc.control.gravity import ArmGravity
 from iowbc.control.sensors import Measured
 from iowbc.control.stride import Stride
 from iowbc.recipe.task.joint_references import References
@@ -46,8 +45,7 @@ class ReferenceLayer(Constants):
             self.feasible = FeasibleMap.load(rg / FEASIBLE).up_to(references.largest_pitch)
         if references.upright:
             self.feasible = FeasibleMap.single(robot.default_height)
-        self._start, self._ahead = references.arms, references.lean * np.eye(3)[0]
-        self._gravity = ArmGravity(robot) if references.arms.gravity else None
+        self._ahead = references.lean * np.eye(3)[0]
         self._compliance = 1.0 / robot.kp[robot.interaction]
         self.default_arms = robot.default_position[robot.interaction]
         self.default_support = robot.default_position[robot.support]
@@ -79,13 +77,13 @@ class ReferenceLayer(Constants):
     def start(self, command: Array, grasp: Array) -> tuple[Array, Array]:
         """References at the start of an episode, standing in the commanded posture: arms (n, arm joints), support (n,
         support joints); command (n, 11); grasp (n, 2, 3): base grasp wrist positions, heading frame [m]."""
-        arms = self.default_arms + 0.0 * command[:, :1]
+        arms, settings = self.default_arms + 0.0 * command[:, :1], self.arms.settings
         target = self.wrist_target(self.support(arms, command), command, grasp)
-        for _ in range(self._start.settling):
-            arms = self.arms.solve_step(arms, target, self._start.settling_time)
+        for _ in range(settings.settling):
+            arms = self.arms.solve_step(arms, target, settings.settling_time)
         support = self.support(arms, command)
-        for _ in range(self._start.refining):
-            arms, support = self.advance(arms, support, command, grasp, self._start.refining_time)
+        for _ in range(settings.refining):
+            arms, support = self.advance(arms, support, command, grasp, settings.refining_time)
         rest = 0.0 * command[:, 0]
         return arms, self.with_stride(support, command, rest, rest > 0.0)
 
@@ -165,9 +163,9 @@ class ReferenceLayer(Constants):
         """Targets of the arms' joint controllers, (n, arm joints) [rad]: the references plus offsets that balance the
         weight of the arms and of a load (n,) [kg] between the hands, θ + τ / kp, in the posture of the references.
         `frames` of `arms`, where they are known."""
-        if self._gravity is None:
+        if not self.arms.settings.gravity:
             return arms
         xp, pitch = namespace(command), self.pelvis_pitch(support, command)
         down = xp.stack([xp.sin(pitch), 0.0 * pitch, -xp.cos(pitch)], 1)
-        torque = self._gravity.torque(arms, support[:, self.waist], down, 0.5 * load[:, None], frames)
+        torque = self.arms.torque(arms, support[:, self.waist], down, 0.5 * load[:, None], frames)
         return arms + torque * self._compliance

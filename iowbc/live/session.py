@@ -17,7 +17,7 @@ from iowbc.live.drag import Drag, Pushed, spring_pulls
 from iowbc.live.moment import MomentRecorder
 from iowbc.live.track import PAST, Played, Track, recorded
 from iowbc.recipe.evaluation.sequences import Segment
-from iowbc.task.planned_pushes import in_world
+from iowbc.task.episodes import in_world
 
 AN_HOUR = (Segment(duration=600.0),) * 6
 """Commands for the maximum length of an episode: one hour."""

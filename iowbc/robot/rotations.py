@@ -38,7 +38,11 @@ def wrapped(angle: Array) -> Array:
 
 def turned(vectors: Array, angle: Array) -> Array:
     """Vectors (n, 2 or 3) turned about the vertical by angles (n,) [rad]."""
-    cosine, sine = np.cos(angle), np.sin(angle)
+    return turned_by(vectors, np.cos(angle), np.sin(angle))
+
+
+def turned_by(vectors: Array, cosine: Array, sine: Array) -> Array:
+    """The same for angles with these cosines and sines, (n,)."""
     result = vectors.copy()
     result[:, 0] = cosine * vectors[:, 0] - sine * vectors[:, 1]
     result[:, 1] = sine * vectors[:, 0] + cosine * vectors[:, 1]

@@ -13,7 +13,7 @@ from iowbc.recipe.simulation.scene import Scene
 from iowbc.recipe.simulation.simulation import SimulationSettings as Recipe
 from iowbc.robot.description import GRAVITY, Robot
 from iowbc.robot.rotations import TINY
-from iowbc.sim.shapes import measured
+from iowbc.sim.objects import measured
 
 PUSH_SHARE = "partner_share/push"
 """Column of the partner's share in a push scene; there it takes the place of `partner_share`."""

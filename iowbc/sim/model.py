@@ -1,17 +1,21 @@
-"""Compiles the model of a scene: the robot's MJCF with motors and ground, and the scene's object."""
+"""The model of a scene: the robot's MJCF with motors and ground, and the scene's object; and indices into it."""
 
+from collections.abc import Iterable
 from typing import Any
 
 import mujoco
 import numpy as np
 
+from iowbc.arrays import Indices, as_slice
 from iowbc.recipe.simulation.scene import Scene
 from iowbc.recipe.simulation.simulation import Physics
 from iowbc.robot.description import Robot
-from iowbc.sim.objects import GROUND_BIT, OBJECT_BIT, add_force_sensor, add_object
+from iowbc.sim.objects import GROUND_BIT, HANDS, OBJECT_BIT, add_force_sensor, add_object
 from iowbc.sim.timing import Timing
 
 GROUND = "ground"
+BASE_LINEAR, BASE_ANGULAR = slice(0, 3), slice(3, 6)
+"""Velocities of the base in qvel."""
 FORCE, NET_FORCE = 1 << mujoco.mjtConDataField.mjCONDATA_FORCE.value, 3
 """Output of MuJoCo's contact sensors: the force alone, summed over all contacts."""
 LEG_BITS = (8, 16)
@@ -134,3 +138,53 @@ def _touches(geom: Any, shape: bool, body_contact: str) -> tuple[int, int]:
     links = (geom.contype, geom.conaffinity & ~OBJECT_BIT) if body_contact == "everything" else (0, 0)
     solid = shape and body_contact != "nothing" and not any(part in geom.parent.name for part in HOLDING)
     return links[0], links[1] | (OBJECT_BIT if solid else 0)
+
+
+class ModelIndex:
+    """Indices into the arrays of a model and of its data. The robot comes first, then the object."""
+
+    def __init__(self, model: Any, robot: Robot) -> None:
+        """Finds everything by name; checks that the joints are in the robot's order."""
+        names = [model.joint(index).name for index in range(model.njnt)]
+        count = len(robot.joints)
+        if tuple(names[1 : count + 1]) != robot.joints:
+            raise ValueError(f"{robot.mjcf}: joints compile to {names}, expected a free joint and then {robot.joints}")
+        bodies = {model.body(index).name: index for index in range(model.nbody)}
+        sites = {model.site(index).name: index for index in range(model.nsite)}
+        geoms = {model.geom(index).name: index for index in range(model.ngeom)}
+        self.joints = slice(7, 7 + count)
+        """Robot's joint positions in qpos."""
+        self.joint_speeds = slice(6, 6 + count)
+        """Robot's joint velocities in qvel."""
+        self.object: int | None = bodies.get("object")
+        """Body of the object."""
+        self.object_position = None if self.object is None else slice(7 + count, model.nq)
+        """Object in qpos: a pose, or x, y and yaw of a crate."""
+        self.base, self.torso = bodies[robot.base], bodies[robot.torso]
+        self.feet = _places(bodies, robot.sole_bodies)
+        """Bodies of the feet, (2,)."""
+        self.hands = _places(bodies, robot.wrist_bodies if self.object is None else HANDS)
+        """Bodies of the hands, (2,); without an object those of the wrists."""
+        self.wrists = _places(bodies, robot.wrist_bodies)
+        """Bodies of the wrists, (2,)."""
+        self.links = _places(bodies, robot.tree.bodies)
+        """Bodies of the robot's own description, in its order."""
+        self.soles, self.grips = _places(sites, robot.soles), _places(sites, robot.wrists)
+        """Sites of the soles and of the grips, (2,)."""
+        self.object_grips = _pair(sites, "object_left_grip", "object_right_grip")
+        """Sites on the object to which the grips are connected, (2,)."""
+        feet = [bodies[name] for name in robot.sole_bodies]
+        self.foot_geoms = np.flatnonzero(np.isin(model.geom_bodyid, feet) & (model.geom_conaffinity != 0))
+        """Contact points of the feet."""
+        self.palms = _pair(geoms, "left_palm", "right_palm")
+        """Geoms of the palms, (2,)."""
+        self.object_geom: int | None = geoms.get("object")
+        """Geom with which the object touches palms."""
+
+
+def _places(indices: dict[str, int], names: Iterable[str]) -> slice | Indices:
+    return as_slice(np.array([indices[name] for name in names]))
+
+
+def _pair(indices: dict[str, int], left: str, right: str) -> Indices | None:
+    return np.array([indices[left], indices[right]]) if left in indices else None

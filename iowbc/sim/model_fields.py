@@ -7,8 +7,8 @@ import numpy as np
 
 from iowbc.arrays import Array, Indices
 from iowbc.recipe.simulation.scene import Scene
-from iowbc.sim.model_index import ModelIndex
-from iowbc.sim.shapes import measured
+from iowbc.sim.model import ModelIndex
+from iowbc.sim.objects import measured
 from iowbc.sim.timing import Timing
 
 FIELDS = (

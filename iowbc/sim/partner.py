@@ -14,9 +14,9 @@ from iowbc.recipe.simulation.scene import Scene
 from iowbc.robot import rotations
 from iowbc.robot.description import GRAVITY
 from iowbc.robot.rotations import TINY
-from iowbc.sim.delay import DelayLine
-from iowbc.sim.shapes import measured
+from iowbc.sim.objects import measured
 from iowbc.sim.state import SimulationState
+from iowbc.sim.timing import DelayLine
 
 NOISE_WIDTH = 3
 """Noise columns that the partner uses per step: two for its unsteady force, one for its share."""
@@ -119,8 +119,7 @@ class Partner:
         self._heading[which] = forward
         away = (self._at - state.base_position)[which]
         away *= ~steered[:, None]
-        self._offset[which, 0] = forward[:, 0] * away[:, 0] + forward[:, 1] * away[:, 1]
-        self._offset[which, 1] = forward[:, 0] * away[:, 1] - forward[:, 1] * away[:, 0]
+        self._offset[which] = rotations.turned_by(away[:, :2], forward[:, 0], -forward[:, 1])
         self.derive()
 
     def _behave(self, which: Indices, drawn: dict[str, Array]) -> None:
@@ -212,15 +211,13 @@ class Partner:
         self._height[:] = commanded[:, 3]
         self._line.push(heard)
         wanted = self._line.read()
-        cosine, sine = self._heading.T
-        offset_x = cosine * self._offset[:, 0] - sine * self._offset[:, 1]
-        offset_y = sine * self._offset[:, 0] + cosine * self._offset[:, 1]
-        velocity = np.empty((len(wanted), 3))
-        velocity[:, 0] = cosine * wanted[:, 0] - sine * wanted[:, 1] - wanted[:, 2] * offset_y
-        velocity[:, 1] = sine * wanted[:, 0] + cosine * wanted[:, 1] + wanted[:, 2] * offset_x
+        rate, velocity = wanted[:, 2], np.empty((len(wanted), 3))
+        offset = rotations.turned_by(self._offset, *self._heading.T)
+        velocity[:, :2] = rotations.turned_by(wanted[:, :2], *self._heading.T)
+        velocity[:, 0] -= rate * offset[:, 1]
+        velocity[:, 1] += rate * offset[:, 0]
         velocity[:, :2] *= self._pace[:, None]
         velocity[:, 2] = wanted[:, 3]
-        rate = wanted[:, 2]
         if self._steers:
             self._own_way = velocity[:, :2].copy()
             self._turn_rate = np.where(self.steered, rate, 0.0)
@@ -270,19 +267,14 @@ class Partner:
             return
         turns, within = np.divmod(self._steps[which] * self._period, tugging.interval)
         pull = tugging.force * (within < tugging.duration)
-        ahead, left = np.array([[1.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, -1.0]])[:, turns.astype(np.int64) % 4] * pull
-        cosine, sine = self._heading[which].T
-        force[which, 0] += cosine * ahead - sine * left
-        force[which, 1] += sine * ahead + cosine * left
+        direction = np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])[turns.astype(np.int64) % 4]
+        force[which, :2] += rotations.turned_by(direction * pull[:, None], *self._heading[which].T)
 
     def _turn(self, angle: Array) -> None:
         """Turns the path's heading by small angles (n,) [rad], by Cayley's form of a rotation."""
         half = 0.5 * angle * (1.0 + angle * angle / 12.0)
         scale = 1.0 / (1.0 + half * half)
-        cosine, sine = (1.0 - half * half) * scale, 2.0 * half * scale
-        x, y = self._heading[:, 0].copy(), self._heading[:, 1].copy()
-        self._heading[:, 0] = cosine * x - sine * y
-        self._heading[:, 1] = sine * x + cosine * y
+        self._heading[:] = rotations.turned_by(self._heading, (1.0 - half * half) * scale, 2.0 * half * scale)
 
     def observe(self, state: SimulationState) -> None:
         """Follows the handle over a period."""

@@ -6,8 +6,8 @@ from iowbc.arrays import Array, Indices, Mask, places
 from iowbc.control.sensors import Measured
 from iowbc.recipe.simulation.simulation import SensorNoise as Recipe
 from iowbc.robot import rotations
-from iowbc.sim.delay import DelayLine
 from iowbc.sim.state import SimulationState
+from iowbc.sim.timing import DelayLine
 
 OBJECT_WIDTH = 13
 NOT_SEEN = np.eye(1, OBJECT_WIDTH, 3)[0]

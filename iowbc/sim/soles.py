@@ -7,7 +7,7 @@ import numpy as np
 from iowbc.arrays import Array
 from iowbc.robot import rotations
 from iowbc.robot.description import Robot
-from iowbc.sim.model_index import ModelIndex
+from iowbc.sim.model import ModelIndex
 
 
 class Soles:

@@ -15,13 +15,11 @@ from iowbc.recipe.simulation.scene import Scene
 from iowbc.recipe.simulation.simulation import Physics
 from iowbc.robot import rotations
 from iowbc.robot.description import GRAVITY, Robot
-from iowbc.sim.grip import Grip, Squeeze
-from iowbc.sim.model import compile_scene, require_stable
+from iowbc.sim.model import BASE_ANGULAR, BASE_LINEAR, ModelIndex, compile_scene, require_stable
 from iowbc.sim.model_fields import ModelFields
-from iowbc.sim.model_index import BASE_ANGULAR, BASE_LINEAR, ModelIndex
+from iowbc.sim.object_forces import Grip, Rolling, Squeeze
 from iowbc.sim.objects import HANDS as HAND_BODIES
-from iowbc.sim.rolling import Rolling
-from iowbc.sim.shapes import measured
+from iowbc.sim.objects import measured
 from iowbc.sim.soles import Soles
 from iowbc.sim.state import Period, SimulationState
 from iowbc.sim.timing import Timing

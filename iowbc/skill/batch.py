@@ -11,7 +11,7 @@ from iowbc.control.skill_observation import YAW, joined, of_object, robot_observ
 from iowbc.evaluation.trials.plan import UNDISTURBED
 from iowbc.robot.rotations import turned
 from iowbc.rollouts.blocks import block_size
-from iowbc.sim.shapes import measured as shape_of
+from iowbc.sim.objects import measured as shape_of
 from iowbc.skill import observation as seen
 from iowbc.skill.episode_draws import EpisodeDraws
 from iowbc.skill.figures import FIGURES, EpisodeFigures, internal_force

@@ -35,7 +35,7 @@ def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
     """Problems: names that are not in s_priv, or that are taken twice."""
     yield from not_privileged(recipe, "teacher.value_only", recipe.teacher.value_only)
     if recipe.task.observation.own:
-        from iowbc.task.own_parts import taken_names
+        from iowbc.task.layout import taken_names
 
         yield from taken_names(recipe.task.observation)
 

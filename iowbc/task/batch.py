@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from iowbc.arrays import Array, Indices, Keys, as_slice
+from iowbc.arrays import Array, Indices, Keys
 from iowbc.control import gait
 from iowbc.control.action import action_scale, applied_action
 from iowbc.control.command import HEIGHT, OFFSET, VELOCITY, YAW_RATE
@@ -14,13 +14,12 @@ from iowbc.control.observation import PolicyInputs
 from iowbc.recipe.simulation.holding import FREE
 from iowbc.robot.description import load_robot
 from iowbc.sim.simulation import Simulation
-from iowbc.task.endings import Ending
 from iowbc.task.episode_state import PER_ENVIRONMENT_FIELDS, EpisodeState
+from iowbc.task.episodes import PlannedPulls, PlannedPushes
 from iowbc.task.guidance import Guidance
-from iowbc.task.judge import Judge, Judgement
+from iowbc.task.judge import Ending, Judge, Judgement
 from iowbc.task.layout import full_layout
 from iowbc.task.motion import Motion
-from iowbc.task.planned_pushes import PlannedPulls, PlannedPushes
 from iowbc.task.privileged import Truth
 from iowbc.task.record import statistics
 from iowbc.task.record.signals import Recorded, write_signals
@@ -43,8 +42,6 @@ class Batch:
         self.layout = full_layout(recipe, self.robot)
         self.n = n = last - first
         self.period = period = 1.0 / task.control_frequency
-        self._support, self._arms = as_slice(self.robot.support), as_slice(self.robot.interaction)
-        self._joint_reference = np.tile(self.robot.default_position, (n, 1))
         self.scenes = np.array(scenes)
         """Name of each environment's scene, (n,)."""
         self.memory = EpisodeState(n, len(self.robot.interaction), len(self.robot.support))
@@ -187,13 +184,11 @@ class Batch:
     def _observe(self, moved: Motion, which: Indices | slice = EVERY) -> None:
         """Writes s_t and s_priv of some environments."""
         memory, simulation, layout = self.memory, self.simulation, self.layout
-        self._joint_reference[:, self._support] = memory.support
-        self._joint_reference[:, self._arms] = memory.arms
         sensed = PolicyInputs(
             measured=simulation.measured,
             command=memory.command,
             heading_reference=(memory.heading_reference + memory.heading_offset)[:, None],
-            joint_reference=self._joint_reference,
+            joint_reference=self.guidance.joints(memory.support, memory.arms),
             phase=gait.phase_signal(memory.phase, memory.stepping),
             last_action=memory.action,
             support_reference=memory.support,
@@ -229,21 +224,19 @@ class Batch:
             values[to] = values[chosen]
         self.simulation.copy(chosen, to)
 
+    def _arrays(self) -> dict[str, Array]:
+        """State arrays by their names in a snapshot, one row per environment, without those of the simulation."""
+        own = vars(self.memory) | {"key": self._schedule.key, "episode_key": self._schedule.episode_key}
+        saved = {f"task/{name}": values for name, values in own.items()}
+        return saved | {f"buffer/{name}": values for name, values in self.buffers.items()}
+
     def snapshot(self) -> dict[str, Array]:
         """Complete state, one row per environment."""
-        schedule = self._schedule
-        own = vars(self.memory) | {"key": schedule.key, "episode_key": schedule.episode_key}
-        saved = {f"task/{name}": values.copy() for name, values in own.items()}
-        saved |= {f"buffer/{name}": values.copy() for name, values in self.buffers.items()}
-        return saved | self.simulation.snapshot()
+        return {name: values.copy() for name, values in self._arrays().items()} | self.simulation.snapshot()
 
     def restore(self, saved: Mapping[str, Array]) -> None:
         """Inverse of `snapshot`: the environments then continue bit for bit."""
-        for name, values in vars(self.memory).items():
-            values[...] = saved[f"task/{name}"]
-        schedule = self._schedule
-        schedule.key[:], schedule.episode_key[:] = saved["task/key"], saved["task/episode_key"]
-        for name, values in self.buffers.items():
-            values[:] = saved[f"buffer/{name}"]
-        self.simulation.reseed(schedule.key)
+        for name, values in self._arrays().items():
+            values[...] = saved[name]
+        self.simulation.reseed(self._schedule.key)
         self.simulation.restore(saved)

@@ -1,4 +1,4 @@
-"""The curriculum: difficulty at the levels of its axes, and updates of an environment's levels."""
+"""The curriculum: difficulty at the levels of its axes, results of episodes, and the levels that follow from them."""
 
 from typing import TYPE_CHECKING
 
@@ -6,9 +6,11 @@ import numpy as np
 
 from iowbc.arrays import Array, Mask
 from iowbc.recipe.task.curriculum import Ceilings, Curriculum
+from iowbc.robot.rotations import TINY
 
 if TYPE_CHECKING:
-    from iowbc.task.progress import EpisodeOutcome
+    from iowbc.task.episode_state import EpisodeState
+    from iowbc.task.judge import Ending
 
 AXES = ("posture", "locomotion", "load", "disturbance")
 """Columns of the levels."""
@@ -55,7 +57,36 @@ def phase(curriculum: Curriculum, levels: Array) -> Array:
     return 1 + first.astype(np.int64) + second
 
 
-def next_levels(curriculum: Curriculum, levels: Array, played: Array, outcome: "EpisodeOutcome") -> Array:
+class EpisodeOutcome:
+    """Results of the episodes of n environments, each (n,); valid where an episode ends in this step."""
+
+    def __init__(self, memory: "EpisodeState", ending: "Ending", period: float, blame: float) -> None:
+        """`blame`: time for which a disturbance counts as recent [s]."""
+        steps = np.maximum(memory.steps, 1)
+        moved = memory.commanded > TINY
+        self.survived = ending.truncated
+        """Reached the time limit."""
+        self.progress_in_time = memory.steps / memory.limit
+        """Fraction of the time limit that was reached."""
+        self.posture = memory.tracking.min(axis=1) / steps
+        """The worse of the mean scores of height and pitch, 0 to 1."""
+        self.walked = memory.walked * period
+        """Time with a commanded velocity [s]."""
+        self.covered = np.where(moved, memory.covered / np.maximum(memory.commanded, TINY), 1.0)
+        """Fraction of the commanded displacement that was covered; 1 if none was commanded."""
+        self.heading = memory.heading_error / steps
+        """Mean heading error [rad]."""
+        self.infeasible = memory.infeasible.copy()
+        """The crate's rolling resistance exceeded the friction of the feet."""
+        self.stepping = memory.stepping.copy()
+        """The gait clock was running at the end."""
+        self.lagged = ending.lagging
+        """Ended because it lagged behind the command."""
+        self.disturbed = memory.undisturbed * period <= blame
+        """An impulse or a push acted shortly before the end."""
+
+
+def next_levels(curriculum: Curriculum, levels: Array, played: Array, outcome: EpisodeOutcome) -> Array:
     """Levels after an episode, (n, axes). An axis whose effective level was capped keeps its level."""
     if not curriculum.enabled:
         return levels
@@ -67,7 +98,7 @@ def next_levels(curriculum: Curriculum, levels: Array, played: Array, outcome: "
     return np.clip(moved, 0.0, np.maximum(ceiling, levels))
 
 
-def _success(curriculum: Curriculum, played: Array, outcome: "EpisodeOutcome") -> Mask:
+def _success(curriculum: Curriculum, played: Array, outcome: EpisodeOutcome) -> Mask:
     steady = outcome.survived & (outcome.posture >= curriculum.tracking)
     walked = outcome.walked >= curriculum.least_walk
     there = (outcome.covered >= curriculum.progress) & (outcome.heading <= curriculum.heading)
@@ -79,7 +110,7 @@ def _success(curriculum: Curriculum, played: Array, outcome: "EpisodeOutcome") -
     return success
 
 
-def _failure(curriculum: Curriculum, played: Array, outcome: "EpisodeOutcome") -> Mask:
+def _failure(curriculum: Curriculum, played: Array, outcome: EpisodeOutcome) -> Mask:
     ended = ~outcome.survived & (outcome.progress_in_time < curriculum.early)
     walking = outcome.stepping | outcome.lagged
     pushed = outcome.disturbed & (played[:, DISTURBANCE] > 0.0) & ~outcome.lagged

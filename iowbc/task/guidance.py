@@ -12,9 +12,9 @@ from iowbc.control.command import HEIGHT
 from iowbc.control.references import ReferenceLayer, both_wrists
 from iowbc.control.sensors import Measured
 from iowbc.robot.description import Robot
-from iowbc.task.commands.commander import Commander
-from iowbc.task.commands.script import CommandScript
+from iowbc.task.commands import Commander
 from iowbc.task.episode_state import EpisodeState
+from iowbc.task.episodes import CommandScript
 from iowbc.task.specification import Specification
 
 
@@ -54,9 +54,7 @@ class Guidance:
         halves = np.floor(2.0 * random.uniform(key, "gait/phase", 1)[:, 0])
         memory.phase[which] = np.where(self.commander.scripted[which], 0.0, 0.5 * halves)
         memory.height_rate[which], memory.feedback[which] = 0.0, 0.0
-        joints = np.empty((len(which), self._joints))
-        joints[:, self._support], joints[:, self._arms] = posture, arms
-        return joints, self.references.start_pitch(posture, command)
+        return self.joints(posture, arms), self.references.start_pitch(posture, command)
 
     def advance(self, memory: EpisodeState, key: Keys, measured: Measured) -> None:
         """Command, references and gait clock of the next step; keys of the episodes, (n,)."""
@@ -77,13 +75,15 @@ class Guidance:
 
     def targets(self, memory: EpisodeState, action: Array) -> Array:
         """Joint targets of an action (n, 15) within its bounds, (n, joints) [rad]: θ_S_ref + scale·a, θ_I_ref."""
-        target = np.empty((len(action), self._joints))
-        target[:, self._support] = memory.support + self._scale * action
         self._frames = self.references.arms.frames(memory.arms)
-        target[:, self._arms] = self.references.arm_target(
-            memory.arms, memory.posture, memory.command, self._load, self._frames
-        )
-        return target
+        arms = self.references.arm_target(memory.arms, memory.posture, memory.command, self._load, self._frames)
+        return self.joints(memory.support + self._scale * action, arms)
+
+    def joints(self, support: Array, arms: Array) -> Array:
+        """Values of both branches in MJCF order, (n, joints)."""
+        values = np.empty((len(arms), self._joints))
+        values[:, self._support], values[:, self._arms] = support, arms
+        return values
 
     def object_place(self, memory: EpisodeState) -> Array:
         """Target position of a held object from the base, heading frame, (n, 3) [m]: it follows the wrist targets."""

@@ -1,4 +1,4 @@
-"""Evaluates a control step: the motion, whether the episode ends, and the reward."""
+"""Evaluates a control step: the motion, whether the episode ends (falls, drops, lag, divergence), and the reward."""
 
 from dataclasses import dataclass
 
@@ -6,19 +6,55 @@ import numpy as np
 
 from iowbc.arrays import Array, Mask, as_slice
 from iowbc.control import gait
-from iowbc.control.command import PITCH, YAW_RATE
+from iowbc.control.command import PITCH, VELOCITY, YAW_RATE
 from iowbc.recipe.recipe import Recipe
+from iowbc.recipe.task.task import Termination
 from iowbc.robot.description import Robot
 from iowbc.robot.rotations import wrapped
 from iowbc.sim.state import SimulationState
 from iowbc.task.curriculum import FULL_RANGE_LEVEL, LOCOMOTION
-from iowbc.task.endings import Ending, dropped, fallen, lagging, lost
 from iowbc.task.episode_state import EpisodeState
 from iowbc.task.motion import Motion, low_pass
-from iowbc.task.progress import follow
 from iowbc.task.rewards.reward import RewardFunction
 from iowbc.task.rewards.table import Step
+from iowbc.task.rewards.terms import progress
 from iowbc.task.yielding import Admittance, excess_force
+
+
+@dataclass(frozen=True)
+class Ending:
+    """Reasons for which episodes end in a step, each (n,). A diverged one is neither fallen, dropped nor lagging."""
+
+    fallen: Mask
+    dropped: Mask
+    lagging: Mask
+    time_limit: Mask
+    diverged: Mask
+
+    @property
+    def failed(self) -> Mask:
+        """Fell, dropped the object, or did not follow the command."""
+        return self.fallen | self.dropped | self.lagging
+
+    @property
+    def done(self) -> Mask:
+        """Ended for any reason."""
+        return self.failed | self.time_limit | self.diverged
+
+    @property
+    def truncated(self) -> Mask:
+        """Reached the time limit without failing or diverging."""
+        return self.time_limit & ~(self.failed | self.diverged)
+
+    def reasons(self) -> dict[str, Mask]:
+        """Exactly one reason for each episode that ended."""
+        return {
+            "fallen": self.fallen,
+            "dropped": self.dropped & ~self.fallen,
+            "lagging": self.lagging & ~(self.fallen | self.dropped),
+            "time_limit": self.truncated,
+            "diverged": self.diverged,
+        }
 
 
 @dataclass(frozen=True)
@@ -64,7 +100,7 @@ class Judge:
         self._filter(memory, moved, resistance * (1.0 - state.partner_share))
         error = wrapped(moved.heading - memory.heading_reference)
         target = self._admittance.velocity(memory.command[:, :YAW_RATE], memory.excess_force)
-        follow(memory, target, error, disturbed, self._task.termination, self._period)
+        self._follow(memory, target, error, disturbed)
         pushed = state.has_object & ~self._holding
         ending = self._ending(state, memory, moved, place, error, pushed)
         foot_phase, stance = gait.foot_phase(memory.phase), self._task.references.gait.stance
@@ -107,6 +143,19 @@ class Judge:
             force = excess_force(moved.hand_force, memory.command[:, :YAW_RATE], needed)
             memory.excess_force[:] = low_pass(memory.excess_force, force, time_constant, self._period)
 
+    def _follow(self, memory: EpisodeState, target: Array, error: Array, disturbed: Mask) -> None:
+        """Adds a step to the sums of the episode; `target`: velocity, heading frame, (n, 2) [m/s]; `error` of heading,
+        (n,) [rad]."""
+        period, speed = self._period, np.hypot(target[:, 0], target[:, 1])
+        along = progress(memory.filtered_velocity[:, :YAW_RATE], target)
+        memory.walked += memory.command[:, VELOCITY].any(axis=1)
+        memory.commanded += speed * period
+        memory.covered += along * period
+        memory.heading_error += np.abs(error)
+        forgotten = memory.lag * (1.0 - period / self._task.termination.lag_time) + (speed - along) * period
+        memory.lag[:] = np.where(speed > 0.0, np.maximum(forgotten, 0.0), 0.0)
+        memory.undisturbed[:] = np.where(disturbed, 0, memory.undisturbed + 1)
+
     def _ending(
         self, state: SimulationState, memory: EpisodeState, moved: Motion, place: Array, error: Array, pushed: Mask
     ) -> Ending:
@@ -120,3 +169,38 @@ class Judge:
             time_limit=memory.steps >= memory.limit,
             diverged=diverged,
         )
+
+
+def fallen(motion: Motion, pitch_command: Array, termination: Termination) -> Mask:
+    """Base or torso beyond the limits, (n,); pitch_command (n,) [rad]."""
+    return (
+        (motion.pelvis_height < termination.pelvis_height)
+        | (motion.pelvis_tilt > termination.pelvis_tilt)
+        | (np.abs(motion.torso_roll) > termination.torso_roll)
+        | (np.abs(motion.torso_pitch - pitch_command) > termination.torso_pitch_error)
+    )
+
+
+def lagging(lag: Array, heading_error: Array, followable: Mask, termination: Termination) -> Mask:
+    """Too far behind the command, (n,): lag (n,) [m], heading error (n,) [rad], where the command can be followed."""
+    late = np.zeros(len(lag), np.bool_)
+    if termination.lag is not None:
+        late |= lag > termination.lag
+    if termination.heading_error is not None:
+        late |= np.abs(heading_error) > termination.heading_error
+    return late & followable
+
+
+def dropped(motion: Motion, place: Array, held: Mask, grasped: Mask, termination: Termination) -> Mask:
+    """A held object out of both hands, or too far from its place in the grasp, (n,). place: the object's place from the
+    base, heading frame, (n, 3) [m]; grasped: hands that hold, (n, 2)."""
+    distance = np.sqrt(np.square(motion.object_offset - place).sum(axis=1))
+    return held & (~grasped.any(axis=1) | (distance > termination.object_distance))
+
+
+def lost(motion: Motion, place: Array, pushed: Mask, termination: Termination) -> Mask:
+    """A pushed object too far to the side of the hands, (n,); place: their middle from the base, heading frame, (n, 3)
+    [m]."""
+    if termination.object_beside is None:
+        return np.zeros(len(pushed), np.bool_)
+    return pushed & (np.abs(motion.object_offset - place)[:, 1] > termination.object_beside)

@@ -8,11 +8,10 @@ import numpy as np
 from iowbc import counter_random as random
 from iowbc.arrays import Array, Indices, Keys, Mask
 from iowbc.recipe.task.task import Task
-from iowbc.task.curriculum import difficulty, initial_levels, next_levels, played_levels
-from iowbc.task.endings import Ending
+from iowbc.task.curriculum import EpisodeOutcome, difficulty, initial_levels, next_levels, played_levels
 from iowbc.task.episode_state import EpisodeState
 from iowbc.task.episodes import Episode
-from iowbc.task.progress import EpisodeOutcome
+from iowbc.task.judge import Ending
 
 
 class Schedule:

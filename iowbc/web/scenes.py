@@ -13,8 +13,7 @@ from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.simulation.scene import Scene
 from iowbc.robot.description import Robot
 from iowbc.sim.model import scene_spec
-from iowbc.sim.objects import HANDS
-from iowbc.sim.shapes import measured
+from iowbc.sim.objects import HANDS, measured
 from iowbc.sim.simulation import Simulation
 from iowbc.sim.timing import Timing
 from iowbc.sim.world import World

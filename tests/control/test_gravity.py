@@ -9,7 +9,6 @@ import pytest
 from pinocchio_states import configuration
 
 from iowbc.control.arms import ArmKinematics
-from iowbc.control.gravity import ArmGravity
 from iowbc.reference.labels.support_model import build_model
 from iowbc.robot import rotations
 from iowbc.robot.description import GRAVITY, Robot
@@ -23,9 +22,9 @@ def postures(robot: Robot) -> Any:
 
 
 def held(robot: Robot, joints: Any, base: Any, load: Any = None) -> Any:
-    """The torques of `ArmGravity` in a base attitude, quaternion wxyz."""
+    """The torques of `ArmKinematics` in a base attitude, quaternion wxyz."""
     down = np.tile(rotations.matrix(base).T @ [0.0, 0.0, -1.0], (len(joints), 1))
-    return ArmGravity(robot).torque(joints[:, robot.interaction], joints[:, 12:15], down, load)
+    return ArmKinematics(robot).torque(joints[:, robot.interaction], joints[:, 12:15], down, load)
 
 
 @pytest.mark.parametrize("tilt", TILTS.values(), ids=TILTS)

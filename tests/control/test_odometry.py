@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from sagittal_plane import measured, sole
 
+from iowbc.control.feedback import LegOdometry
 from iowbc.control.legs import leg_joints
-from iowbc.control.odometry import LegOdometry
 from iowbc.robot.description import Robot
 
 STEP = 1e-6

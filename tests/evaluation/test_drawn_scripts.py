@@ -16,7 +16,7 @@ from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.task.commands import Commands
 from iowbc.recipe.teacher import Check
 from iowbc.robot.description import robot_folder
-from iowbc.task.commands.script import CommandScript
+from iowbc.task.episodes import CommandScript
 from iowbc.task.specification import Specification
 
 SCRIPTS, COMMANDS, DT = DrawnScripts(), Commands(), 0.02

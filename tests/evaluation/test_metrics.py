@@ -10,8 +10,7 @@ from made_up_trials import DT, GAIT_STEPS, RECIPE, ROBOT, outcome, script, trace
 from iowbc.evaluation.trials.errors import ERRORS, error_norm, moving_average
 from iowbc.evaluation.trials.metrics import effort_metrics, jerk, second_difference, trial_metrics
 from iowbc.robot.rotations import wrapped
-from iowbc.task.commands.script import CommandScript
-from iowbc.task.episodes import Episode
+from iowbc.task.episodes import CommandScript, Episode
 from iowbc.task.record.signals import Trace
 
 

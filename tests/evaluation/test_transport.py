@@ -7,7 +7,7 @@ from iowbc.arrays import Array
 from iowbc.evaluation.trials.table import succeeded
 from iowbc.evaluation.trials.transport import beside, commanded_path, covered
 from iowbc.recipe.evaluation.evaluation import Success
-from iowbc.task.commands.script import CommandScript, CommandSegment
+from iowbc.task.episodes import CommandScript, CommandSegment
 
 DT = 0.02
 REST = (0.72, 0.0, *[0.0] * 6)

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from iowbc.control.arms import ArmKinematics
-from iowbc.control.gravity import ArmGravity
 from iowbc.control.legs import leg_joints
 from iowbc.control.observation import observation_layout
 from iowbc.control.references import ReferenceLayer, both_wrists
@@ -44,7 +43,7 @@ def test_its_arms_and_their_weight_are_those_of_the_simulator(robot_of_23: Robot
         for side, site in enumerate(robot.wrists):
             seen = torso.xmat.reshape(3, 3).T @ (data.site(site).xpos - torso.xpos)
             assert wrists[0, side] == pytest.approx(seen, abs=1e-9)
-        torque = ArmGravity(robot).torque(
+        torque = arms.torque(
             joints[None, robot.interaction], joints[None, robot.support[robot.waist]], np.array([[0.0, 0.0, -1.0]])
         )
         assert torque[0] == pytest.approx(data.qfrc_bias[6:][robot.interaction], abs=1e-6)

@@ -15,7 +15,7 @@ from iowbc.recipe.section import Vector
 from iowbc.recipe.simulation.scene import Object, Scene
 from iowbc.recipe.simulation.simulation import SimulationSettings as Recipe
 from iowbc.robot.description import GRAVITY
-from iowbc.sim.shapes import measured
+from iowbc.sim.objects import measured
 from iowbc.sim.simulation import Simulation
 
 SIZE = (0.3, 0.2, 0.4)

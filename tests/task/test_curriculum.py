@@ -9,10 +9,9 @@ import pytest
 from task_worlds import actions
 
 from iowbc.recipe.task.curriculum import Curriculum
-from iowbc.task.curriculum import AXES, difficulty, initial_levels, next_levels, phase, played_levels
-from iowbc.task.endings import Ending
+from iowbc.task.curriculum import AXES, EpisodeOutcome, difficulty, initial_levels, next_levels, phase, played_levels
 from iowbc.task.episode_state import EpisodeState
-from iowbc.task.progress import EpisodeOutcome
+from iowbc.task.judge import Ending
 from iowbc.task.vector.vector_env import VectorEnv
 
 Make = Callable[..., VectorEnv]

@@ -11,9 +11,9 @@ from iowbc import counter_random as random
 from iowbc.control.command import COMMAND, HEIGHT, OFFSET, PITCH, VELOCITY, approach, nominal_command, rate_limits
 from iowbc.recipe.task.commands import CommandRates, Commands
 from iowbc.recipe.task.curriculum import Curriculum
-from iowbc.task.commands.drawing import draw_goals, draw_holding_time
-from iowbc.task.commands.script import CommandScript, CommandSegment
+from iowbc.task.commands import draw_goals, draw_holding_time
 from iowbc.task.curriculum import difficulty
+from iowbc.task.episodes import CommandScript, CommandSegment
 from iowbc.task.vector.vector_env import VectorEnv
 
 Make = Callable[..., VectorEnv]

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from task_worlds import actions, rollout, same
 
-from iowbc.task.commands.script import CommandScript, CommandSegment
-from iowbc.task.episodes import Episode
+from iowbc.task.episodes import CommandScript, CommandSegment, Episode
 from iowbc.task.vector.vector_env import VectorEnv
 
 Make = Callable[..., VectorEnv]

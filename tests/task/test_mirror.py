@@ -12,8 +12,7 @@ from iowbc.control.action import action_mirror
 from iowbc.control.command import command_mirror
 from iowbc.robot.description import Robot
 from iowbc.sim import world
-from iowbc.task.commands.script import CommandScript, CommandSegment
-from iowbc.task.episodes import Episode
+from iowbc.task.episodes import CommandScript, CommandSegment, Episode
 from iowbc.task.vector.vector_env import VectorEnv
 
 Make = Callable[..., VectorEnv]

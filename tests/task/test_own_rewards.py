@@ -15,8 +15,7 @@ from iowbc.recipe.reading.loading import load_recipe
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.section import deciding
 from iowbc.stages.registry import STAGES
-from iowbc.task.commands.script import CommandScript, CommandSegment
-from iowbc.task.episodes import Episode
+from iowbc.task.episodes import CommandScript, CommandSegment, Episode
 from iowbc.task.vector.vector_env import VectorEnv
 
 HALF = "import numpy as np\n\n\ndef half(step):\n    return np.full(len(step.command), 0.5)\n"

@@ -5,9 +5,7 @@ import pytest
 
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import Robot
-from iowbc.task.commands.script import CommandScript, CommandSegment
-from iowbc.task.episodes import Episode, PlannedPush
-from iowbc.task.planned_pushes import PlannedPushes
+from iowbc.task.episodes import CommandScript, CommandSegment, Episode, PlannedPush, PlannedPushes
 from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv
 

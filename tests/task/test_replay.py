@@ -7,8 +7,8 @@ import pytest
 from changes import changed
 
 from iowbc.recipe.recipe import Recipe
-from iowbc.task.endings import Ending
 from iowbc.task.episode_state import EpisodeState
+from iowbc.task.judge import Ending
 from iowbc.task.schedule import Schedule
 
 COUNT = 3

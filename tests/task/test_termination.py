@@ -9,7 +9,7 @@ import pytest
 from task_worlds import QUIET
 
 from iowbc.recipe.task.task import Termination
-from iowbc.task.endings import dropped, fallen, lagging, lost
+from iowbc.task.judge import dropped, fallen, lagging, lost
 from iowbc.task.vector.vector_env import VectorEnv
 
 Make = Callable[..., VectorEnv]

@@ -5,8 +5,7 @@ import pytest
 from task_worlds import rollout
 
 from iowbc.recipe.task.reward import Yielding
-from iowbc.task.commands.script import CommandScript, CommandSegment
-from iowbc.task.episodes import Episode
+from iowbc.task.episodes import CommandScript, CommandSegment, Episode
 from iowbc.task.yielding import Admittance, excess_force
 
 WALK = np.array([[0.5, 0.0]])

@@ -13,8 +13,7 @@ from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.simulation.holding import FREE
 from iowbc.recipe.simulation.partner import BEHAVIOURS
 from iowbc.recipe.task.commands import Commands
-from iowbc.task.commands.script import CommandScript, CommandSegment
-from iowbc.task.episodes import Episode, PlannedPull, PlannedPush
+from iowbc.task.episodes import CommandScript, CommandSegment, Episode, PlannedPull, PlannedPush
 
 NO_OBJECT = "no object"
 """Case of a sweep in the scene without an object."""

@@ -10,7 +10,7 @@ from iowbc.control.command import nominal_command, rate_limits
 from iowbc.recipe.evaluation.sequences import DrawnScripts
 from iowbc.recipe.section import Range
 from iowbc.recipe.task.commands import Commands
-from iowbc.task.commands.script import CommandScript, CommandSegment
+from iowbc.task.episodes import CommandScript, CommandSegment
 
 WORDS = 256
 """Random numbers per script; more than any script uses."""

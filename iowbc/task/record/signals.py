@@ -15,8 +15,8 @@ from iowbc.task.rewards import terms
 if TYPE_CHECKING:
     from iowbc.sim.simulation import Simulation
     from iowbc.sim.state import SimulationState
-    from iowbc.task.endings import Ending
     from iowbc.task.episode_state import EpisodeState
+    from iowbc.task.judge import Ending
     from iowbc.task.motion import Motion
     from iowbc.task.vector.shared import Buffers
 

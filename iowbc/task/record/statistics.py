@@ -7,9 +7,8 @@ import numpy as np
 from iowbc.arrays import Array, Indices, Mask
 from iowbc.control.command import HEIGHT, PITCH, VELOCITY, YAW_RATE
 from iowbc.task.curriculum import AXES
-from iowbc.task.endings import Ending
 from iowbc.task.episode_state import EpisodeState
-from iowbc.task.judge import Judgement
+from iowbc.task.judge import Ending, Judgement
 from iowbc.task.vector.shared import Buffers
 
 REASONS = ("fallen", "dropped", "lagging", "time_limit", "diverged")

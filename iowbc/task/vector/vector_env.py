@@ -16,8 +16,7 @@ from iowbc.rollouts.rollout import RolloutPolicy, Trajectories, roll, side_by_si
 from iowbc.task.batch import Batch
 from iowbc.task.curriculum import AXES
 from iowbc.task.episodes import Episode
-from iowbc.task.layout import full_layout
-from iowbc.task.own_parts import load_parts
+from iowbc.task.layout import full_layout, load_parts
 from iowbc.task.record.signals import SIGNALS
 from iowbc.task.record.statistics import REASONS, Statistics
 from iowbc.task.rewards.reward import load_terms, term_names

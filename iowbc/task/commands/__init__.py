@@ -1,1 +1,0 @@
-"""Sources of commands: random in training, scripted in trials."""
