@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from iowbc.arrays import Array
-from iowbc.evaluation.side_by_side import Actor
+from iowbc.evaluation.films import Actor
 from iowbc.evaluation.trials.errors import deviations_from_clamped
 from iowbc.evaluation.trials.interaction import load_metrics
 from iowbc.evaluation.trials.rollout import in_batch, play_in, playing, trace_of
