@@ -11,7 +11,7 @@ from iowbc.stages.inputs import generator_stage, policy_stage, without_student
 
 if TYPE_CHECKING:
     from iowbc.deploy.controller import Values
-    from iowbc.evaluation.acceptance import Accepted
+    from iowbc.evaluation.exported import Accepted
     from iowbc.export.graph import ControllerGraph
     from iowbc.learning.networks import StudentNetwork
 
@@ -23,7 +23,7 @@ def run(job: Job) -> None:
 
     from iowbc.deploy import contract, exported_folder
     from iowbc.deploy.timing import step_seconds
-    from iowbc.evaluation.acceptance import golden_inputs, run_acceptance, try_out_network
+    from iowbc.evaluation.exported import golden_inputs, run_acceptance, try_out_network
     from iowbc.export import golden
     from iowbc.export.folder import write_folder
     from iowbc.learning.acting import policy_of

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from made_up_trials import DT, RECIPE, ROBOT, outcome, script, trace
 
-from iowbc.evaluation.acceptance import Accepted, judged
+from iowbc.evaluation.exported import Accepted, judged
 from iowbc.evaluation.trials.rollout import Outcome
 from iowbc.recipe.evaluation.sequences import Segment
 from iowbc.recipe.export import Acceptance

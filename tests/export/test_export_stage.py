@@ -20,7 +20,7 @@ from iowbc.deploy.contract import Contract, read_contract, seal
 from iowbc.deploy.controller import open_session, run
 from iowbc.deploy.exported_folder import CONTRACT, GOLDEN, SETTLE, STEP
 from iowbc.errors import ContractBroken, Interrupted, NoDisplay, StageFailed, UsageError
-from iowbc.evaluation.acceptance import try_out_network
+from iowbc.evaluation.exported import try_out_network
 from iowbc.evaluation.play import exported_source, play, require_display
 from iowbc.evaluation.play_request import PlayRequest
 from iowbc.export import golden
