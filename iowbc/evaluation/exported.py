@@ -16,10 +16,9 @@ from iowbc.deploy import contract, exported_folder
 from iowbc.deploy.controller import Controller, Values
 from iowbc.errors import ContractBroken
 from iowbc.evaluation.trials.errors import ERRORS
-from iowbc.evaluation.trials.metrics import trial_metrics
+from iowbc.evaluation.trials.metrics import transported, trial_metrics
 from iowbc.evaluation.trials.plan import UNDISTURBED, command_script, planned_episode
 from iowbc.evaluation.trials.rollout import Outcome, play_episodes, play_in, playing
-from iowbc.evaluation.trials.table import transported
 from iowbc.learning.acting import Policy
 from iowbc.recipe.evaluation.sequences import Segment
 from iowbc.recipe.export import Acceptance

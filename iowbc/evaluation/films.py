@@ -17,9 +17,9 @@ from PIL import Image, ImageDraw, ImageFont
 from iowbc.arrays import Array
 from iowbc.errors import NoRenderer
 from iowbc.evaluation.report.aggregate import case_names
+from iowbc.evaluation.trials.metrics import replayed
 from iowbc.evaluation.trials.plan import Trial
 from iowbc.evaluation.trials.rollout import Outcome, in_batch, play_in, playing
-from iowbc.evaluation.trials.table import replayed
 from iowbc.learning.acting import Policy
 from iowbc.recipe.evaluation.evaluation import Video
 from iowbc.sim.rendering.renderer import Line, SceneRenderer

@@ -12,8 +12,8 @@ from iowbc.arrays import Array
 from iowbc.evaluation.films import Actor
 from iowbc.evaluation.trials.errors import deviations_from_clamped
 from iowbc.evaluation.trials.interaction import load_metrics
+from iowbc.evaluation.trials.metrics import replayed
 from iowbc.evaluation.trials.rollout import in_batch, play_in, playing, trace_of
-from iowbc.evaluation.trials.table import replayed
 from iowbc.live.drag import Drag
 from iowbc.live.drawing import VIEW, GameMarks
 from iowbc.live.moment import Moment, MomentRecorder

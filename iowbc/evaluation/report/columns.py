@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from iowbc.evaluation.trials.errors import ERRORS
-from iowbc.evaluation.trials.transport import SHORTEST_WAY
+from iowbc.evaluation.trials.errors import ERRORS, SHORTEST_WAY
 from iowbc.results.table import ABSENT, FAILS, Cell, Column, Table, heads, measured
 
 STANDS_STILL = "stands still"

@@ -19,7 +19,7 @@ from iowbc.evaluation.report.columns import (
     variant_table,
 )
 from iowbc.evaluation.report.figures import draw_bars, finish, line_labels, style_of, tidy
-from iowbc.evaluation.trials.impedance import apparent
+from iowbc.evaluation.trials.interaction import apparent
 from iowbc.results.table import ABSENT, FAILS, Cell, Column, Table, measured
 
 BLOCKED_BEFORE = {"IO-WBC": (113, 231), "w/o Distill.": (73, 109)}
@@ -54,7 +54,8 @@ IMPEDANCE = (
     Entry(Column("Impedance [N·s/m]"), lambda row: measured(abs(_value(row)), form=".0f", none=FAILS)),
     Entry(Column("Phase [°]"), lambda row: measured(np.degrees(np.angle(_value(row))), form="+.0f", none=FAILS)),
 )
-FITTED = (Column("Stiffness [N/m]"), Column("Damping [N·s/m]"), Column("Mass [kg]"))
+FITTED = {"Stiffness [N/m]": ".0f", "Damping [N·s/m]": ".0f", "Mass [kg]": ".1f"}
+"""Columns of `apparent` with their number format."""
 
 
 def compliance_table(summary: pd.DataFrame) -> Table:
@@ -77,7 +78,7 @@ def compliance_table(summary: pd.DataFrame) -> Table:
 def impedance_table(summary: pd.DataFrame) -> Table:
     """Mechanical impedance by direction and frequency of the pull, and the fitted mass, spring and damper."""
     chosen = summary[summary["kind"] == "impedance"]
-    entries = (*IMPEDANCE, *(Entry(column, lambda row: ABSENT) for column in FITTED))
+    entries = (*IMPEDANCE, *(Entry(Column(head), lambda row: ABSENT) for head in FITTED))
     rows: list[tuple[Cell, ...]] = []
     numbers = []
     for direction, within in chosen.groupby("pull_direction", sort=False):
@@ -88,10 +89,9 @@ def impedance_table(summary: pd.DataFrame) -> Table:
             if own.empty:
                 continue
             values = np.array([_value(row) for _, row in own.iterrows()])
-            found = apparent(own["pull_frequency"].to_numpy(np.float64), values)
-            spring = [measured(value, form=".0f") for value in (found.stiffness, found.damping)]
-            rows.append((f"{direction}, all", str(variant), *[ABSENT] * 3, *spring, measured(found.mass, form=".1f")))
-            fit = {"stiffness": found.stiffness, "damping": found.damping, "mass_apparent": found.mass}
+            fit = apparent(own["pull_frequency"].to_numpy(np.float64), values)
+            cells = [measured(value, form=form) for value, form in zip(fit.values(), FITTED.values(), strict=True)]
+            rows.append((f"{direction}, all", str(variant), *[ABSENT] * 3, *cells))
             numbers.append({"variant": variant, "pull_direction": direction} | fit)
     caption = (
         f"Mechanical impedance of the standing robot with an object of {float(chosen['mass'].iloc[0]):g} kg to small "
