@@ -26,7 +26,7 @@ from iowbc.report.runs import Run
 if TYPE_CHECKING:
     from iowbc.evaluation.films import Actor
     from iowbc.evaluation.play import Source
-    from iowbc.live.track import Played
+    from iowbc.live.session import Played
     from iowbc.skill.single_game import SingleGame
 
 

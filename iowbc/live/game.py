@@ -10,9 +10,9 @@ from iowbc.arrays import Array
 from iowbc.learning.networks import TeacherNetwork
 from iowbc.live.drag import Drag
 from iowbc.live.drawing import GameMarks
-from iowbc.live.moment import Moment, MomentRecorder
 from iowbc.live.panel import LAST_SEED, Button, ControlPanel, table_row
-from iowbc.live.track import PAST, WINDOW, Played, Track
+from iowbc.live.session import Played
+from iowbc.live.track import PAST, WINDOW, Moment, MomentRecorder, Track
 from iowbc.robot import rotations
 from iowbc.sim.rendering.forces import Force
 from iowbc.skill.game import NOMINAL

@@ -16,8 +16,8 @@ from iowbc.evaluation.play_request import PlayRequest
 from iowbc.evaluation.trials.plan import DIRECTIONS
 from iowbc.live.drag import Pushed
 from iowbc.live.drawing import ShownParts
-from iowbc.live.session import Session
-from iowbc.live.track import PAST, WINDOW, Played, Track
+from iowbc.live.session import Played, Session
+from iowbc.live.track import PAST, WINDOW, Track
 from iowbc.recipe.task.commands import Commands
 
 Button = Literal["pause", "reset", "push robot", "push object", "next task"]
