@@ -4,7 +4,7 @@ import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from iowbc.errors import ContractBroken
 from iowbc.evaluation.trials.errors import ERRORS
 from iowbc.evaluation.trials.metrics import transported, trial_metrics
 from iowbc.evaluation.trials.plan import UNDISTURBED, command_script, planned_episode
-from iowbc.evaluation.trials.rollout import Outcome, play_episodes, play_in, playing
+from iowbc.evaluation.trials.rollout import Outcome, play_in, playing
 from iowbc.learning.acting import Policy
 from iowbc.recipe.evaluation.sequences import Segment
 from iowbc.recipe.export import Acceptance
@@ -29,6 +29,7 @@ from iowbc.task.episodes import Episode
 from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv
 
+Acting = TypeVar("Acting", bound=Policy)
 TINY = 1e-9
 """Lower bound of an error, in its unit, as denominator of a relative difference."""
 
@@ -66,9 +67,9 @@ class ExportedPolicy:
     from those that the environment computes from the action [rad]; it covers arm kinematics, reference generator, gait
     clock and scaling."""
 
-    def __init__(self, controller: Controller, environment: VectorEnv, *, golden_steps: int = 0) -> None:
+    def __init__(self, folder: Path, environment: VectorEnv, *, golden_steps: int = 0) -> None:
         """`golden_steps`: number of steps of the first environment to keep as golden vectors."""
-        self.controller, self.environment = controller, environment
+        self.controller, self.environment = Controller.load(folder, robots=environment.num_envs), environment
         self.golden_steps = golden_steps
         self.inputs: list[Values] = []
         self.largest_difference = 0.0
@@ -142,27 +143,16 @@ def acceptance_episodes(recipe: Recipe) -> list[Episode]:
 
 
 def run_acceptance(
-    world: Specification, exported: Path, interrupted: Callable[[], bool]
-) -> tuple[ExportedPolicy, list[Accepted]]:
-    """Acceptance trials with the controller in the folder `exported`: the policy, which holds the largest difference of
-    joint targets, and the results. Raises Interrupted when interrupted."""
-    episodes = acceptance_episodes(world.recipe)
+    world: Specification, policy_in: Callable[[VectorEnv], Acting], interrupted: Callable[[], bool]
+) -> tuple[Acting, list[Accepted]]:
+    """Acceptance trials with the policy that `policy_in` makes for an environment: the policy, and the result of each
+    `export.acceptance`. Raises Interrupted when interrupted."""
+    recipe, robot, episodes = world.recipe, load_robot(world.robot), acceptance_episodes(world.recipe)
     with playing(world, episodes) as environment:
-        policy = ExportedPolicy(Controller.load(exported, robots=len(episodes)), environment)
-        return policy, _each_judged(world, episodes, play_in(environment, policy, interrupted))
-
-
-def try_out_network(world: Specification, policy: Policy, interrupted: Callable[[], bool]) -> list[Accepted]:
-    """Run the acceptance trials with the original trained policy. Raises Interrupted when interrupted."""
-    episodes = acceptance_episodes(world.recipe)
-    return _each_judged(world, episodes, play_episodes(world, episodes, policy, workers=0, interrupted=interrupted))
-
-
-def _each_judged(world: Specification, episodes: list[Episode], outcomes: list[Outcome]) -> list[Accepted]:
-    """The result of each `export.acceptance`."""
-    trials, robot = iter(zip(episodes, outcomes, strict=True)), load_robot(world.robot)
-    asked = world.recipe.export.acceptance
-    return [judged(world.recipe, robot, one, list(itertools.islice(trials, one.trials))) for one in asked]
+        policy = policy_in(environment)
+        trials = iter(zip(episodes, play_in(environment, policy, interrupted), strict=True))
+    asked = recipe.export.acceptance
+    return policy, [judged(recipe, robot, one, list(itertools.islice(trials, one.trials))) for one in asked]
 
 
 def judged(recipe: Recipe, robot: Robot, asked: Acceptance, trials: list[tuple[Episode, Outcome]]) -> Accepted:
@@ -191,6 +181,6 @@ def golden_inputs(world: Specification, exported: Path, interrupted: Callable[[]
     """Controller inputs of each control step, without the state; fewer than `export.golden_steps` if the robot falls.
     Raises Interrupted."""
     with playing(world, [golden_episode(world.recipe)]) as environment:
-        policy = ExportedPolicy(Controller.load(exported), environment, golden_steps=world.recipe.export.golden_steps)
+        policy = ExportedPolicy(exported, environment, golden_steps=world.recipe.export.golden_steps)
         play_in(environment, policy, interrupted)
     return policy.inputs

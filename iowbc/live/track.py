@@ -168,8 +168,7 @@ class Track:
         `weight_in_hands`, NaN where nothing is to be measured; and the part of the time at the torque limit, of the
         joints that ever were."""
         seen = self.latest(place)
-        signals = {name: np.stack([moment.signals[name] for moment in seen])[:, None] for name in RECORDED}
-        trace = trace_of(signals, 0, len(seen), self.period)
+        trace = trace_of({name: np.stack([one.signals[name] for one in seen]) for name in RECORDED}, self.period)
         deviations = deviations_from_clamped(trace, max(1, round(self._gait_period / self.period)))
         load = load_metrics(trace, self.held_weight, self.held_weight > Success().least_weight)
         shares = zip(self._joints, trace.joint_saturation.mean(axis=0).tolist(), strict=True)

@@ -101,7 +101,7 @@ def play_in(
     recorded = {name: np.stack([frame[name].reshape(count, -1) for frame in frames]) for name in RECORDED}
     return [
         Outcome(
-            trace=trace_of(recorded, index, int(length[index]), dt),
+            trace=trace_of({name: values[: length[index], index] for name, values in recorded.items()}, dt),
             seconds=float(length[index] * dt),
             ending=endings[index],
             drawn={name: values[index] for name, values in drawn.items()},
@@ -110,9 +110,8 @@ def play_in(
     ]
 
 
-def trace_of(recorded: Mapping[str, Array], index: int, steps: int, dt: float) -> Trace:
-    """Trace of the first `steps` of one environment, from signals of shape (T, n, k) by name."""
-    rows = {name: values[:steps, index] for name, values in recorded.items()}
+def trace_of(rows: Mapping[str, Array], dt: float) -> Trace:
+    """Trace of one environment, from signals of shape (T, k) by name."""
     return Trace(dt=dt, **{name: row if row.shape[1] > 1 else row[:, 0] for name, row in rows.items()})
 
 
