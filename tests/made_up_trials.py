@@ -53,7 +53,7 @@ def outcome(
     seconds, values = DT * len(signals), {name: np.array([value]) for name, value in drawn.items()}
     values |= {"motor_strength": np.full(len(robot.joints), strength)}
     values |= {"linkage_effort": np.full(len(robot.linkages), 50.0)}
-    return Outcome(signals, seconds, fallen=False, dropped=False, finished=True, drawn=values)
+    return Outcome(signals, seconds, "finished", values)
 
 
 def trace(steps: int = 400) -> Trace:

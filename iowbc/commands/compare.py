@@ -298,7 +298,7 @@ def film_joint(store: Store, console: Console, runs: Sequence[Run], output: Path
 
 def _film(store: Store, console: Console, tried: Sequence[Run], path: Path, quiet: bool = False) -> None:
     """Film a trial that all share side by side, with the first training of each recipe, or all of a single recipe."""
-    from iowbc.evaluation.side_by_side import common_trial, film_side_by_side
+    from iowbc.evaluation.films import common_trial, film_side_by_side
 
     first = [group.runs[0].label for group in grouped(tried)]
     progress = film_progress(console, None if quiet else path)

@@ -24,9 +24,9 @@ from iowbc.pipeline.store.store import Store
 from iowbc.report.runs import Run
 
 if TYPE_CHECKING:
+    from iowbc.evaluation.films import Actor
     from iowbc.evaluation.play import Source
-    from iowbc.evaluation.side_by_side import Actor
-    from iowbc.live.track import Played
+    from iowbc.live.session import Played
     from iowbc.skill.single_game import SingleGame
 
 

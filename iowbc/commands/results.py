@@ -25,7 +25,7 @@ from iowbc.stages.registry import STAGES
 if TYPE_CHECKING:
     import pandas as pd
 
-    from iowbc.evaluation.side_by_side import Actor
+    from iowbc.evaluation.films import Actor
 
 METRICS_SHOWN = 3
 """Maximum number of metrics shown per stage."""
@@ -119,7 +119,7 @@ def evaluated_actor(store: Store, artifact: Artifact, trials: "pd.DataFrame | No
     """The actor of an artifact of `eval`; `trials`: its table, if it is read already. Raises `UsageError`."""
     import pandas as pd
 
-    from iowbc.evaluation.side_by_side import Actor
+    from iowbc.evaluation.films import Actor
     from iowbc.evaluation.trials.protocol import evaluated_policy, evaluated_world
 
     if trials is None and not (artifact.folder / TRIALS).is_file():

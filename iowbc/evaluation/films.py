@@ -1,7 +1,9 @@
-"""Videos (mp4) of episodes and replayed trials, with lines of text in a corner."""
+"""Videos (mp4) of episodes and replayed trials, with lines of text in a corner; several variants side by side."""
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -15,9 +17,9 @@ from PIL import Image, ImageDraw, ImageFont
 from iowbc.arrays import Array
 from iowbc.errors import NoRenderer
 from iowbc.evaluation.report.aggregate import case_names
+from iowbc.evaluation.trials.metrics import replayed
 from iowbc.evaluation.trials.plan import Trial
 from iowbc.evaluation.trials.rollout import Outcome, in_batch, play_in, playing
-from iowbc.evaluation.trials.table import replayed
 from iowbc.learning.acting import Policy
 from iowbc.recipe.evaluation.evaluation import Video
 from iowbc.sim.rendering.renderer import Line, SceneRenderer
@@ -35,6 +37,8 @@ UNSEEN = ("robustness", "pushes", "impedance", "map")
 """Kinds of trials that are not filmed, since they look like others."""
 SMALL = Video(width=480, height=368, fps=10)
 """Video settings during training: 10 s take about 15 s to render without a graphics card, and 0.4 MB."""
+TRIAL = ["suite", "case", "mass", "impulse", "trial"]
+"""Columns that identify a trial of a variant."""
 NOT_WORD = str.maketrans({" ": "_", "/": "_"})
 
 
@@ -178,3 +182,60 @@ class TrainingFilms:
             self.parts = 0
             return False
         return True
+
+
+@dataclass(frozen=True)
+class Actor:
+    """A variant in the video."""
+
+    world: Specification
+    policy: Policy
+    trials: pd.DataFrame
+    """Its long table."""
+
+
+def common_trial(actors: Sequence[Actor]) -> list["pd.Series[Any]"]:
+    """Rows of all actors for one common trial of the middle mass; empty if they have no trial in common."""
+    shared = actors[0].trials
+    for actor in actors[1:]:
+        shared = shared.merge(actor.trials[TRIAL], on=TRIAL)
+    chosen = filmed(shared, 1)
+    if not chosen:
+        return []
+    wanted = chosen[0][1][TRIAL]
+    return [actor.trials[(actor.trials[TRIAL] == wanted).all(axis=1)].iloc[0] for actor in actors]
+
+
+def film_side_by_side(
+    actors: Sequence[Actor], rows: Sequence["pd.Series[Any]"], path: Path, progress: Callable[[float, float], None]
+) -> None:
+    """Replay the trial in each actor's row and film them as tiles; a trial that ends early keeps its last frame.
+    `progress` receives the time played in all trials and their total maximum duration [s]. Raises NoRenderer."""
+    video = actors[0].world.recipe.eval.video
+    with TemporaryDirectory() as place:
+        clips: list[list[Path]] = [[] for _ in actors]
+        duration, before = sum(float(row["duration"]) for row in rows), 0.0
+        for number, (actor, row, clip) in enumerate(zip(actors, rows, clips, strict=True)):
+
+            def keep(frame: Frame, number: int = number, clip: list[Path] = clip) -> None:
+                clip.append(Path(place) / f"{number}_{len(clip):06}.png")
+                Image.fromarray(frame).save(clip[-1], compress_level=1)
+
+            def further(seconds: float, before: float = before) -> None:
+                progress(before + seconds, duration)
+
+            film_trial(actor.world, actor.policy, row, keep, video, progress=further)
+            before += float(row["duration"])
+            progress(before, duration)
+        with written_film(path, video.fps) as add:
+            for number in range(max(map(len, clips))):
+                add(tiled([np.asarray(Image.open(clip[min(number, len(clip) - 1)])) for clip in clips]))
+
+
+def tiled(frames: Sequence[Frame]) -> Frame:
+    """Frames of one size as one image, in rows of equal length; empty tiles are black."""
+    columns = math.ceil(math.sqrt(len(frames)))
+    rows = math.ceil(len(frames) / columns)
+    empty = [np.zeros_like(frames[0])] * (rows * columns - len(frames))
+    tiles = np.stack([*frames, *empty]).reshape(rows, columns, *frames[0].shape)
+    return np.concatenate(np.concatenate(tiles, axis=1), axis=1)

@@ -10,7 +10,6 @@ from pathlib import Path
 
 from iowbc.control.action import action_mirror
 from iowbc.deploy import contract, exported_folder
-from iowbc.deploy.controller import Controller
 from iowbc.errors import Interrupted, NoDisplay, require_known
 from iowbc.evaluation.exported import ExportedPolicy, exported_world
 from iowbc.evaluation.films import film_episode, written_film
@@ -82,11 +81,8 @@ def play(
         settings = recipe.eval.video.model_copy(update={"duration": episode.duration})
         title = f"{recipe.name}: {episode.scene}, {request.object_mass:g} kg, seed {request.seed}"
         with written_film(request.video, settings.fps) as add:
-
-            def further(seconds: float) -> None:
-                progress(seconds, episode.duration)
-
-            return episode, *film_episode(environment, policy, add, settings, title, progress=further)
+            filmed = (environment, policy, add, settings, title)
+            return episode, *film_episode(*filmed, progress=lambda seconds: progress(seconds, episode.duration))
 
 
 def requested_episode(recipe: Recipe, request: PlayRequest) -> Episode:
@@ -100,7 +96,7 @@ def requested_episode(recipe: Recipe, request: PlayRequest) -> Episode:
 def open_policy(source: Source, environment: VectorEnv) -> Policy:
     """The policy of a source: an exported controller where there is a contract, else a network."""
     if source.exported:
-        return ExportedPolicy(Controller.load(source.policy, robots=environment.num_envs), environment)
+        return ExportedPolicy(source.policy, environment)
     if source.policy.is_dir():
         return load_policy(source.policy, environment.layout.describe())
     mirrors = (environment.layout.mirror, action_mirror(load_robot(source.world.robot)))

@@ -1,15 +1,18 @@
-"""The scene in the browser: the bodies of a model, forces, the support polygon, the reference posture, a path."""
+"""The scene in the browser: the bodies of a model as triangles, forces, support polygon, reference posture, a path."""
 
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import mujoco
 import numpy as np
+import trimesh
 import viser
 
 from iowbc.arrays import Array
 from iowbc.live.drag import Drags
-from iowbc.live.moment import Moment
-from iowbc.live.shapes import BodyMesh, collision_shapes, looks
+from iowbc.live.track import Moment
+from iowbc.robot import rotations
 from iowbc.robot.description import Robot
 from iowbc.sim.rendering.forces import ARROW_RADIUS, COLOURS
 from iowbc.sim.rendering.renderer import Line
@@ -32,6 +35,32 @@ HANDLE, HANDLE_RADIUS = (25, 150, 65), 0.06
 """Colour and radius [m] of the handle that a person takes hold of."""
 LINE = 0.02
 """Thickness of lines on the ground [m]."""
+GEOM = mujoco.mjtGeom
+HIDDEN_GROUP = 3
+"""First group of geoms that is hidden, as in MuJoCo's own viewer."""
+ROUND = 24
+"""Segments of a circle."""
+PRIMITIVES: Mapping[Any, Callable[[Array], Any]] = {
+    GEOM.mjGEOM_BOX: lambda size: trimesh.creation.box(2.0 * size),
+    GEOM.mjGEOM_CAPSULE: lambda size: trimesh.creation.capsule(radius=size[0], height=2.0 * size[1], count=[ROUND] * 2),
+    GEOM.mjGEOM_CYLINDER: lambda size: trimesh.creation.cylinder(radius=size[0], height=2.0 * size[1], sections=ROUND),
+    GEOM.mjGEOM_SPHERE: lambda size: trimesh.creation.icosphere(2).apply_scale(size[0]),
+    GEOM.mjGEOM_ELLIPSOID: lambda size: trimesh.creation.icosphere(2).apply_scale(size),
+}
+"""Shapes about the origin of a size; the axis of a capsule or cylinder is z, as in MuJoCo."""
+
+
+@dataclass(frozen=True)
+class BodyMesh:
+    """Triangles of one colour on a body."""
+
+    body: str
+    vertices: Array
+    """Body frame, (v, 3) [m]."""
+    faces: Array
+    """(f, 3)."""
+    colour: tuple[float, float, float, float]
+    """Red, green, blue, opacity, 0 to 1."""
 
 
 @dataclass(frozen=True)
@@ -191,3 +220,42 @@ class Drawing:
         far = np.linalg.norm(away) > LEFT_BEHIND
         self._at += away if far else FOLLOWING * away
         self._root.position = np.array([-self._at[0], -self._at[1], 0.0])
+
+
+def looks(model: Any) -> Iterator[BodyMesh]:
+    """Meshes that MuJoCo's viewer shows, without the ground."""
+    return _merged(model, lambda geom: model.geom_group[geom] < HIDDEN_GROUP)
+
+
+def collision_shapes(model: Any) -> Iterator[BodyMesh]:
+    """The primitive collision shapes, visible or hidden."""
+    return _merged(model, lambda geom: model.geom_type[geom] != GEOM.mjGEOM_MESH.value)
+
+
+def _merged(model: Any, wanted: Callable[[int], bool]) -> Iterator[BodyMesh]:
+    chosen: dict[tuple[int, tuple[float, ...]], list[tuple[Array, Array]]] = {}
+    for geom in range(model.ngeom):
+        if model.geom_type[geom] != GEOM.mjGEOM_PLANE.value and wanted(geom):
+            material = model.geom_matid[geom]
+            colour = model.geom_rgba[geom] if material < 0 else model.mat_rgba[material]
+            key = int(model.geom_bodyid[geom]), tuple(round(float(part), 4) for part in colour)
+            chosen.setdefault(key, []).append(_triangles(model, geom))
+    for (body, colour), parts in chosen.items():
+        vertices, faces = trimesh.util.append_faces(*zip(*parts, strict=True))
+        yield BodyMesh(model.body(body).name, vertices, faces, colour)  # type: ignore[arg-type]
+
+
+def _triangles(model: Any, geom: int) -> tuple[Array, Array]:
+    """Vertices in the body's frame, and faces."""
+    kind, size = GEOM(model.geom_type[geom]), model.geom_size[geom]
+    if kind == GEOM.mjGEOM_MESH:
+        mesh = int(model.geom_dataid[geom])
+        first, start = model.mesh_vertadr[mesh], model.mesh_faceadr[mesh]
+        vertices = model.mesh_vert[first : first + model.mesh_vertnum[mesh]]
+        faces = model.mesh_face[start : start + model.mesh_facenum[mesh]]
+    elif kind in PRIMITIVES:
+        made = PRIMITIVES[kind](size)
+        vertices, faces = np.asarray(made.vertices), np.asarray(made.faces)
+    else:
+        raise ValueError(f"the viewer in the browser draws no geoms of type {kind.name}")
+    return rotations.rotate(model.geom_quat[geom], vertices) + model.geom_pos[geom], faces

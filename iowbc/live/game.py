@@ -10,9 +10,9 @@ from iowbc.arrays import Array
 from iowbc.learning.networks import TeacherNetwork
 from iowbc.live.drag import Drag
 from iowbc.live.drawing import GameMarks
-from iowbc.live.moment import Moment, MomentRecorder
 from iowbc.live.panel import LAST_SEED, Button, ControlPanel, table_row
-from iowbc.live.track import PAST, WINDOW, Played, Track
+from iowbc.live.session import Played
+from iowbc.live.track import PAST, WINDOW, Moment, MomentRecorder, Track
 from iowbc.robot import rotations
 from iowbc.sim.rendering.forces import Force
 from iowbc.skill.game import NOMINAL
@@ -48,8 +48,7 @@ class GameSession(Played):
         self.request, self._game = request, SingleGame(self.world, self._student, networks, request)
         self._lower = self._game.lower
         self.robot, self.period = self._lower.robot, self._lower.period
-        self._signals = {name: np.zeros((1, 1)) for name in ("covered", "length", "lateral", "share")}
-        self._recorder = MomentRecorder(self._lower, self._signals)
+        self._recorder = MomentRecorder(self._lower, {})
         self.reset()
 
     def reset(self) -> None:
@@ -93,14 +92,12 @@ class GameSession(Played):
 
     def _look(self) -> Moment:
         """The present moment; of the partner's force the arrow shows the horizontal part, which the mouse makes."""
-        now, simulation, signals = self._game.batch.now, self._lower.simulation, self._signals
+        now, simulation, moment = self._game.batch.now, self._lower.simulation, self._recorder.look(self._game.seconds)
         force = simulation.state.partner_force[0]
-        signals["covered"][:], signals["length"][:] = now.covered, now.covered + now.left
-        signals["lateral"][:], signals["share"][:] = now.lateral, force[2]
-        moment = self._recorder.look(self._game.seconds)
+        way = {"covered": now.covered.copy(), "length": now.covered + now.left, "lateral": now.lateral.copy()}
         pull = Force("partner", simulation.partner.at[0], force * [1.0, 1.0, 0.0])
         others = tuple(force for force in moment.forces if force.kind != "partner")
-        return replace(moment, forces=(pull, *others))
+        return replace(moment, forces=(pull, *others), signals=way | {"share": force[2:].copy()})
 
 
 class GamePanel(ControlPanel):

@@ -7,10 +7,11 @@ from typing import Any
 import viser
 
 from iowbc.errors import Interrupted
-from iowbc.evaluation.side_by_side import Actor
+from iowbc.evaluation.films import Actor
 from iowbc.live.drawing import Drawing
 from iowbc.live.panel import LIVE, ControlPanel, DrivingPanel
-from iowbc.live.track import PAST, Played, Track, played_again, trial_title
+from iowbc.live.session import Played
+from iowbc.live.track import PAST, Track, played_again, trial_title
 
 PICTURES = 1.0 / 25.0
 """Time between two pictures [s]."""

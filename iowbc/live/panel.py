@@ -16,8 +16,8 @@ from iowbc.evaluation.play_request import PlayRequest
 from iowbc.evaluation.trials.plan import DIRECTIONS
 from iowbc.live.drag import Pushed
 from iowbc.live.drawing import ShownParts
-from iowbc.live.session import Session
-from iowbc.live.track import PAST, WINDOW, Played, Track
+from iowbc.live.session import Played, Session
+from iowbc.live.track import PAST, WINDOW, Track
 from iowbc.recipe.task.commands import Commands
 
 Button = Literal["pause", "reset", "push robot", "push object", "next task"]
@@ -32,8 +32,8 @@ STRONGEST_PUSH = 60.0
 LAST_SEED = 2**32 - 1
 LABELS = ("forward [m/s]", "left [m/s]", "turn left [rad/s]", "height [m]", "lean [rad]")
 """Sliders of the command's first entries, in its order."""
-UNITS = {"E_v": "m/s", "E_psi": "rad", "E_alpha": "rad", "E_h": "m"}
-SYMBOLS = {"E_v": "E<sub>v</sub>", "E_psi": "E<sub>ψ</sub>", "E_alpha": "E<sub>α</sub>", "E_h": "E<sub>h</sub>"}
+ERRORS = {"E_v": ("v", "m/s"), "E_psi": ("ψ", "rad"), "E_alpha": ("α", "rad"), "E_h": ("h", "m")}
+"""Index of an error's symbol, and its unit."""
 CELL = "padding:0 0.6em 0 0;text-align:right"
 NAME = "padding:0 0.6em 0 0;text-align:left"
 
@@ -148,7 +148,7 @@ class DrivingPanel(ControlPanel):
             ("lean", signals["torso_pitch_command"][0], signals["torso_pitch"][0], "rad"),
         ]
         asked = [table_row(name, f"{first:+.2f}", f"{second:+.2f} {unit}") for name, first, second, unit in rows]
-        errors = [table_row(SYMBOLS[name], f"{means[name]:.3f} {unit}") for name, unit in UNITS.items()]
+        errors = [table_row(f"E<sub>{i}</sub>", f"{means[name]:.3f} {unit}") for name, (i, unit) in ERRORS.items()]
         hands = "–" if isnan(means["weight_in_hands"]) else f"{100 * means['weight_in_hands']:.0f} %"
         worst = sorted(saturated.items(), key=lambda pair: -pair[1])
         limits = ", ".join(f"{escape(name.removesuffix('_joint'))} {100 * share:.0f} %" for name, share in worst)

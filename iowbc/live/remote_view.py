@@ -16,9 +16,9 @@ import viser
 from iowbc.arrays import Array
 from iowbc.live.drag import Pushed, spring_pulls
 from iowbc.live.drawing import Drawing, ShownParts
-from iowbc.live.moment import SimulationRecorder
 from iowbc.live.page import PICTURES
 from iowbc.live.server import serving
+from iowbc.live.track import SimulationRecorder
 from iowbc.robot.description import Robot
 from iowbc.sim.rendering.forces import Force
 from iowbc.sim.simulation import Simulation

@@ -1,9 +1,11 @@
-"""A policy that is driven by hand: one environment, commands, pushes, and what happened in the last minute."""
+"""Episodes on a page: a policy that is driven by hand, with commands, pushes, and what happened in the last minute."""
 
 import contextlib
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -14,15 +16,62 @@ from iowbc.evaluation.play import Source, open_policy, requested_episode
 from iowbc.evaluation.play_request import PlayRequest
 from iowbc.evaluation.trials.plan import DIRECTIONS
 from iowbc.live.drag import Drag, Pushed, spring_pulls
-from iowbc.live.moment import MomentRecorder
-from iowbc.live.track import PAST, Played, Track, recorded
+from iowbc.live.drawing import VIEW, GameMarks
+from iowbc.live.track import PAST, MomentRecorder, Track, recorded
 from iowbc.recipe.evaluation.sequences import Segment
+from iowbc.robot.description import Robot
 from iowbc.task.episodes import in_world
 
 AN_HOUR = (Segment(duration=600.0),) * 6
 """Commands for the maximum length of an episode: one hour."""
 PUSH_DURATION = 0.1
 """Length of a push [s]; as long as those of `eval.robustness.pushes`."""
+
+
+class Played(ABC):
+    """Episodes for a page, to be closed."""
+
+    track: Track
+    """Record of the current episode."""
+    request: Any
+    """The conditions of the episode, as `begin` takes them."""
+    robot: Robot
+    period: float
+    """Time of a step [s]."""
+    marks: GameMarks | None = None
+    """Path, walls and handle of a game."""
+    view = VIEW
+    """Initial position and target of a camera [m]."""
+    checkpoint = ""
+    """Text about the checkpoint in use, if the policy is in training."""
+
+    def begin(self, request: Any) -> None:
+        """A new episode under other conditions."""
+        self.close()
+        self._open(request)
+
+    @abstractmethod
+    def _open(self, request: Any) -> None:
+        """Sets up the simulation of an episode."""
+
+    @abstractmethod
+    def reset(self) -> None:
+        """Restart the episode."""
+
+    @abstractmethod
+    def step(self) -> None:
+        """One control period. After an episode's end, which `track.ending` names, nothing moves until a reset."""
+
+    @abstractmethod
+    def drag(self, drags: Sequence[Drag]) -> None:
+        """Apply mouse drags until the next call."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Ends the simulation."""
+
+    def refresh(self) -> None:  # noqa: B027 (a game has no checkpoint)
+        """Reload the policy if it is a checkpoint that was rewritten."""
 
 
 class Session(Played):

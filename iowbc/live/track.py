@@ -1,24 +1,29 @@
-"""Episodes of a page, their recorded moments, and replays of evaluated trials."""
+"""Episodes as displayed, independent of the simulation: moments, tracks of them, and replays of evaluated trials."""
 
-from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
+import mujoco
 import numpy as np
 import pandas as pd
+from scipy.spatial import ConvexHull
 
 from iowbc.arrays import Array
-from iowbc.evaluation.side_by_side import Actor
+from iowbc.control.command import COMMAND
+from iowbc.evaluation.films import Actor
 from iowbc.evaluation.trials.errors import deviations_from_clamped
 from iowbc.evaluation.trials.interaction import load_metrics
+from iowbc.evaluation.trials.metrics import replayed
 from iowbc.evaluation.trials.rollout import in_batch, play_in, playing, trace_of
-from iowbc.evaluation.trials.table import replayed
-from iowbc.live.drag import Drag
-from iowbc.live.drawing import VIEW, GameMarks
-from iowbc.live.moment import Moment, MomentRecorder
 from iowbc.recipe.evaluation.evaluation import Success
-from iowbc.robot.description import GRAVITY, Robot
+from iowbc.robot import rotations
+from iowbc.robot.description import GRAVITY
+from iowbc.sim.rendering.appearance import Appearance
+from iowbc.sim.rendering.forces import Force, forces
+from iowbc.sim.simulation import Simulation
+from iowbc.task.batch import Batch
 from iowbc.task.record.signals import RECORDED
 from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv
@@ -27,6 +32,106 @@ PAST = 60.0
 """Length of the past of an episode that is kept, and can be looked at [s]."""
 WINDOW = 3.0
 """Figures are means over so long a time [s]; the weight in the hands leaves out its first second."""
+
+
+@dataclass(frozen=True)
+class Moment:
+    """One control step, world frame."""
+
+    seconds: float
+    """Time since the start of the episode [s]."""
+    bodies: Array
+    """Position and quaternion (wxyz) of every body of the model, (bodies, 7)."""
+    reference: Array
+    """The same for the robot in its reference posture, the base where it is, (bodies, 7)."""
+    forces: tuple[Force, ...]
+    balance: Array
+    """The point of the ground beneath the centre of mass of robot and held object, (3,) [m]."""
+    support: Array
+    """Corners of the convex hull of the soles that touch the ground, in order, (k, 3) [m]; k is 0 in the air."""
+    command: Array
+    """Command of the next step, (11,)."""
+    signals: Mapping[str, Array]
+    """Figures of the step just made, each (k,); in an environment those that a trial records."""
+
+
+class SimulationRecorder:
+    """Takes down the moments of the first environment of a simulation, which know no reference and no command."""
+
+    def __init__(self, simulation: Simulation) -> None:
+        self._simulation = simulation
+        self._appearance = Appearance(simulation, 0)
+        self.model = self._appearance.model
+        """Model for drawing: with visual geoms, and the object's size in the current episode."""
+        self._world = simulation.world_of(0)[0]
+        robot = simulation.robot
+        soles = [self.model.body(name).id for name in robot.sole_bodies]
+        self._corners = [
+            np.flatnonzero((self.model.geom_bodyid == sole) & (self.model.geom_conaffinity != 0)) for sole in soles
+        ]
+        self._held = self._world.scene.kind == "lift"
+
+    @property
+    def held_mass(self) -> float:
+        """Mass of the object in the hands [kg]; 0 without one."""
+        return float(self._simulation.drawn["object_mass"][0]) if self._held else 0.0
+
+    def look(self, seconds: float) -> Moment:
+        data = self._appearance.update()
+        bodies = np.hstack([data.xpos, data.xquat])
+        return Moment(
+            seconds=seconds,
+            bodies=bodies,
+            reference=bodies,
+            forces=tuple(forces(self._simulation, 0)),
+            balance=self._balance(),
+            support=self._support(data),
+            command=np.zeros(len(COMMAND)),
+            signals={},
+        )
+
+    def _balance(self) -> Array:
+        simulation, state = self._simulation, self._simulation.state
+        centre: Array = state.com_position[0].copy()
+        if self._held:
+            offset = rotations.rotate(state.object_quaternion[:1], simulation.drawn["object_com_offset"][:1])[0]
+            part = self.held_mass / (self.held_mass + float(self._world.robot_mass[0]))
+            centre += part * (state.object_position[0] + offset - centre)
+        centre[2] = 0.0
+        return centre
+
+    def _support(self, data: Any) -> Array:
+        touching = self._simulation.state.foot_contact[0]
+        corners = [data.geom_xpos[points, :2] for points, down in zip(self._corners, touching, strict=True) if down]
+        if not corners:
+            return np.zeros((0, 3))
+        points = np.concatenate(corners)
+        hull = points[ConvexHull(points).vertices]
+        return np.column_stack([hull, np.zeros(len(hull))])
+
+
+class MomentRecorder(SimulationRecorder):
+    """Takes down the moments of the first environment of a batch, in its present episode."""
+
+    def __init__(self, batch: Batch, signals: Mapping[str, Array]) -> None:
+        """`signals`: by name, (n, k); the simulation overwrites them in every step."""
+        super().__init__(batch.simulation)
+        self.batch, self._signals = batch, signals
+        self._reference = mujoco.MjData(self.model)
+
+    def look(self, seconds: float) -> Moment:
+        moment = super().look(seconds)
+        robot, memory, reference = self._simulation.robot, self.batch.memory, self._reference
+        reference.qpos[:] = self._appearance.data.qpos
+        joints = reference.qpos[self._world.layout.joints]
+        joints[robot.support], joints[robot.interaction] = memory.support[0], memory.arms[0]
+        mujoco.mj_kinematics(self.model, reference)
+        return replace(
+            moment,
+            reference=np.hstack([reference.xpos, reference.xquat]),
+            command=np.array(self.batch.memory.command[0]).reshape(len(COMMAND)),
+            signals={name: values[0].copy() for name, values in self._signals.items()},
+        )
 
 
 class Track:
@@ -63,58 +168,11 @@ class Track:
         `weight_in_hands`, NaN where nothing is to be measured; and the part of the time at the torque limit, of the
         joints that ever were."""
         seen = self.latest(place)
-        signals = {name: np.stack([moment.signals[name] for moment in seen])[:, None] for name in RECORDED}
-        trace = trace_of(signals, 0, len(seen), self.period)
+        trace = trace_of({name: np.stack([one.signals[name] for one in seen]) for name in RECORDED}, self.period)
         deviations = deviations_from_clamped(trace, max(1, round(self._gait_period / self.period)))
         load = load_metrics(trace, self.held_weight, self.held_weight > Success().least_weight)
         shares = zip(self._joints, trace.joint_saturation.mean(axis=0).tolist(), strict=True)
         return deviations.means() | load, {name: share for name, share in shares if share > 0}
-
-
-class Played(ABC):
-    """Episodes for a page, to be closed."""
-
-    track: Track
-    """Record of the current episode."""
-    request: Any
-    """The conditions of the episode, as `begin` takes them."""
-    robot: Robot
-    period: float
-    """Time of a step [s]."""
-    marks: GameMarks | None = None
-    """Path, walls and handle of a game."""
-    view = VIEW
-    """Initial position and target of a camera [m]."""
-    checkpoint = ""
-    """Text about the checkpoint in use, if the policy is in training."""
-
-    def begin(self, request: Any) -> None:
-        """A new episode under other conditions."""
-        self.close()
-        self._open(request)
-
-    @abstractmethod
-    def _open(self, request: Any) -> None:
-        """Sets up the simulation of an episode."""
-
-    @abstractmethod
-    def reset(self) -> None:
-        """Restart the episode."""
-
-    @abstractmethod
-    def step(self) -> None:
-        """One control period. After an episode's end, which `track.ending` names, nothing moves until a reset."""
-
-    @abstractmethod
-    def drag(self, drags: Sequence[Drag]) -> None:
-        """Apply mouse drags until the next call."""
-
-    @abstractmethod
-    def close(self) -> None:
-        """Ends the simulation."""
-
-    def refresh(self) -> None:  # noqa: B027 (a game has no checkpoint)
-        """Reload the policy if it is a checkpoint that was rewritten."""
 
 
 def recorded(environment: VectorEnv) -> dict[str, Array]:

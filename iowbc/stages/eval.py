@@ -74,7 +74,7 @@ def measure(job: Job, world: "Specification", policy: "Policy") -> dict[str, flo
     """Play the trials whose errors are measured, report and film them; the figures to show at the end of a run."""
     from iowbc.errors import NoRenderer
     from iowbc.evaluation.films import film_trial, filmed, written_film
-    from iowbc.evaluation.report.other_tables import PROBING
+    from iowbc.evaluation.report.limits import PROBING
     from iowbc.evaluation.report.report import write_report
     from iowbc.evaluation.trials.protocol import Protocol
 
@@ -172,7 +172,7 @@ def world_and_policy(
 def headline(summary: "pd.DataFrame") -> dict[str, float]:
     """Success and errors of each case and at each suite's lightest and heaviest mass; forces of compliance trials."""
     from iowbc.evaluation.report.aggregate import case_names
-    from iowbc.evaluation.report.other_tables import PROBING
+    from iowbc.evaluation.report.limits import PROBING
     from iowbc.evaluation.trials.errors import ERRORS
 
     metrics = {name: float(summary[name].sum()) for name in ("trials", "survived", "succeeded")}

@@ -10,11 +10,13 @@ from iowbc.recipe.export import Export
 from iowbc.stages.inputs import generator_stage, policy_stage, without_student
 
 if TYPE_CHECKING:
-    from iowbc.evaluation.acceptance import Accepted
+    from iowbc.evaluation.exported import Accepted
 
 
 def run(job: Job) -> None:
     """Export, compare the graph with torch, and play the acceptance trials with the exported controller."""
+    from functools import partial
+
     import numpy as np
     import torch
 
@@ -24,7 +26,7 @@ def run(job: Job) -> None:
     from iowbc.deploy.controller import open_session
     from iowbc.deploy.controller import run as run_onnx
     from iowbc.deploy.timing import step_seconds
-    from iowbc.evaluation.acceptance import golden_inputs, run_acceptance, try_out_network
+    from iowbc.evaluation.exported import ExportedPolicy, golden_inputs, run_acceptance
     from iowbc.export import golden
     from iowbc.export.folder import write_folder
     from iowbc.export.graph import ControllerGraph
@@ -46,8 +48,9 @@ def run(job: Job) -> None:
     statement = write_folder(job.out, graph, job.recipe, rg, sources)
     try:
         world = Specification(job.recipe, job.robot, rg).deployed
-        policy, played = run_acceptance(world, job.out, job.interrupted)
-        by_torch = try_out_network(world, policy_of(student, about["architecture"]), job.interrupted)
+        policy, played = run_acceptance(world, partial(ExportedPolicy, job.out), job.interrupted)
+        by_torch = policy_of(student, about["architecture"])
+        _, expected = run_acceptance(world, lambda environment: by_torch, job.interrupted)
         steps = golden_inputs(world, job.out, job.interrupted)
     except Interrupted as stopped:
         raise Interrupted(f"export: {stopped}; it starts anew, which takes less than a minute") from stopped
@@ -69,7 +72,7 @@ def run(job: Job) -> None:
         "acceptance_passed": float(sum(each.passed for each in played)),
         **{
             f"errors_differ/{place}": each.differs_from(other)
-            for place, (each, other) in enumerate(zip(played, by_torch, strict=True))
+            for place, (each, other) in enumerate(zip(played, expected, strict=True))
         },
     }
     job.report.metrics(metrics, 0)

@@ -10,7 +10,7 @@ import torch
 from numpy.typing import NDArray
 
 from iowbc.control.sensors import Measured
-from iowbc.deploy.controller import Controller, open_session, run
+from iowbc.deploy.controller import open_session, run
 from iowbc.deploy.exported_folder import SETTLE, STEP
 from iowbc.evaluation.exported import ExportedPolicy
 from iowbc.evaluation.trials.plan import command_script, planned_episode
@@ -56,8 +56,7 @@ def driven(recipe: Recipe, robot: Robot, rg: Path, graph: ControllerGraph, expor
         planned_episode(scene, script, mass, 3, {}) for scene, mass in (("lift", 4.0), ("free", 0.0), ("push", 20.0))
     )
     environment = VectorEnv(Specification(recipe, robot.folder, rg), num_envs=3, workers=0, seed=0, episodes=episodes)
-    controller = Controller.load(exported, robots=3)
-    both = Both(ExportedPolicy(controller, environment, golden_steps=80), StudentPolicy(graph.student, graph.history))
+    both = Both(ExportedPolicy(exported, environment, golden_steps=80), StudentPolicy(graph.student, graph.history))
     try:
         play_in(environment, both)
     finally:

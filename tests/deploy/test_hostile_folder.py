@@ -16,8 +16,7 @@ from iowbc.deploy.contract import Contract, read_contract, seal
 from iowbc.deploy.controller import Controller
 from iowbc.deploy.exported_folder import CONTRACT
 from iowbc.errors import ContractBroken
-from iowbc.evaluation.acceptance import golden_episode
-from iowbc.evaluation.exported import exported_world
+from iowbc.evaluation.exported import exported_world, golden_episode
 from iowbc.robot.description import DESCRIPTION, robot_folder
 from iowbc.task.vector.vector_env import VectorEnv
 

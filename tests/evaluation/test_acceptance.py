@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from made_up_trials import DT, RECIPE, ROBOT, outcome, script, trace
 
-from iowbc.evaluation.acceptance import Accepted, judged
+from iowbc.evaluation.exported import Accepted, judged
 from iowbc.evaluation.trials.rollout import Outcome
 from iowbc.recipe.evaluation.sequences import Segment
 from iowbc.recipe.export import Acceptance
@@ -28,7 +28,7 @@ def played(
     path[:, 0] = covered * WALK[0] * DT * np.arange(STEPS)
     moved = replace(signals, grip_force=grip, base_position=path, object_position=np.add(path, [0.3, beside, 1.0]))
     commands = script(8.0, WALK if covered else (0.0, 0.0, 0.0))
-    return Episode("lift", 0, 8.0, {}, commands), replace(outcome(moved, MASS), fallen=fallen, finished=not fallen)
+    return Episode("lift", 0, 8.0, {}, commands), replace(outcome(moved, MASS), ending="fell" if fallen else "finished")
 
 
 def accepted(*trials: tuple[Episode, Outcome], minimum: int = 1) -> Accepted:

@@ -5,11 +5,10 @@ import pytest
 
 from iowbc.arrays import Array
 from iowbc.control.command import rate_limits
-from iowbc.evaluation.trials.errors import ERRORS, deviations_standing_still
+from iowbc.evaluation.trials.errors import ERRORS, commanded_path, deviations_standing_still
 from iowbc.evaluation.trials.plan import SPLITS, planned_sweeps, trial_seed
 from iowbc.evaluation.trials.quick import quick_trials
 from iowbc.evaluation.trials.scripts import drawn_script
-from iowbc.evaluation.trials.transport import commanded_path
 from iowbc.recipe.evaluation.evaluation import Evaluation
 from iowbc.recipe.evaluation.sequences import DrawnScripts
 from iowbc.recipe.recipe import Recipe

@@ -17,11 +17,11 @@ from stage_jobs import Backwards, make_job
 from iowbc.errors import Interrupted
 from iowbc.evaluation.paper import LIFTING
 from iowbc.evaluation.trials.errors import ERRORS
+from iowbc.evaluation.trials.metrics import replayed
 from iowbc.evaluation.trials.plan import planned_sweeps
 from iowbc.evaluation.trials.protocol import Protocol, evaluated_world
 from iowbc.evaluation.trials.quick import FIGURES, QuickEvaluation, figures, quick_trials
 from iowbc.evaluation.trials.rollout import in_batch, play_episodes
-from iowbc.evaluation.trials.table import replayed
 from iowbc.learning.acting import load_policy
 from iowbc.learning.networks import StudentNetwork, TeacherNetwork
 from iowbc.learning.storage import save_network

@@ -8,8 +8,13 @@ import pytest
 from made_up_trials import trials_of
 
 from iowbc.evaluation.report.aggregate import aggregate
-from iowbc.evaluation.report.compliance import compliance_figure, compliance_table, impedance_table
-from iowbc.evaluation.report.push_map import map_figure, map_table
+from iowbc.evaluation.report.interaction import (
+    compliance_figure,
+    compliance_table,
+    impedance_table,
+    map_figure,
+    map_table,
+)
 from iowbc.evaluation.report.report import write_report
 
 FREQUENCIES = (0.2, 0.5, 1.0, 2.0)

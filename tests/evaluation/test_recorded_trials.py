@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from iowbc.evaluation.trials.metrics import trial_row
 from iowbc.evaluation.trials.plan import UNDISTURBED, Trial, command_script, planned_episode
 from iowbc.evaluation.trials.rollout import Outcome, play_episodes
-from iowbc.evaluation.trials.table import trial_row
 from iowbc.recipe.evaluation.sequences import Segment
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.simulation.partner import BEHAVIOURS

@@ -10,12 +10,19 @@ from matplotlib.container import ErrorbarContainer
 
 from iowbc.evaluation.paper import LIFTING, PUSHING, VARIANTS, reported
 from iowbc.evaluation.report.aggregate import aggregate, case_names, variants_of
-from iowbc.evaluation.report.capacity import capacity_table, load_capacities, push_capacities, push_table
 from iowbc.evaluation.report.differences import difference_table, mean_difference, paired, success_p
 from iowbc.evaluation.report.error_tables import error_table, moving_table, paper_table
 from iowbc.evaluation.report.figures import comparison, errors_against_mass, robustness, style_of
 from iowbc.evaluation.report.interquartile import interquartile_table
-from iowbc.evaluation.report.other_tables import contact_table, joint_table, success_table
+from iowbc.evaluation.report.limits import (
+    capacity_table,
+    contact_table,
+    joint_table,
+    load_capacities,
+    push_capacities,
+    push_table,
+    success_table,
+)
 from iowbc.evaluation.report.report import write_report
 from iowbc.evaluation.trials.errors import ERRORS
 from iowbc.results.table import Table, heads, latex, markdown

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from made_up_trials import trials_of
 
-from iowbc.evaluation.side_by_side import Actor, common_trial, film_side_by_side, tiled
+from iowbc.evaluation.films import Actor, common_trial, film_side_by_side, tiled
 from iowbc.evaluation.trials.protocol import Protocol
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import robot_folder

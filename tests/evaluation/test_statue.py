@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from made_up_trials import DT, outcome, trace
 
-from iowbc.evaluation.trials.metrics import trial_metrics
+from iowbc.evaluation.trials.metrics import succeeded, trial_metrics
 from iowbc.evaluation.trials.plan import (
     Trial,
     case_trials,
@@ -18,7 +18,6 @@ from iowbc.evaluation.trials.plan import (
 )
 from iowbc.evaluation.trials.protocol import evaluated_world
 from iowbc.evaluation.trials.rollout import Outcome
-from iowbc.evaluation.trials.table import succeeded
 from iowbc.recipe.reading.loading import load_recipe
 from iowbc.robot.description import GRAVITY, load_robot, robot_folder
 from iowbc.task.specification import Specification

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from iowbc.arrays import Array
-from iowbc.evaluation.trials.table import succeeded
-from iowbc.evaluation.trials.transport import beside, commanded_path, covered
+from iowbc.evaluation.trials.errors import beside, commanded_path, covered
+from iowbc.evaluation.trials.metrics import succeeded
 from iowbc.recipe.evaluation.evaluation import Success
 from iowbc.task.episodes import CommandScript, CommandSegment
 

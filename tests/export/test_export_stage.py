@@ -20,7 +20,7 @@ from iowbc.deploy.contract import Contract, read_contract, seal
 from iowbc.deploy.controller import open_session, run
 from iowbc.deploy.exported_folder import CONTRACT, GOLDEN, SETTLE, STEP
 from iowbc.errors import ContractBroken, Interrupted, NoDisplay, StageFailed, UsageError
-from iowbc.evaluation.acceptance import try_out_network
+from iowbc.evaluation.exported import run_acceptance
 from iowbc.evaluation.play import exported_source, play, require_display
 from iowbc.evaluation.play_request import PlayRequest
 from iowbc.export import golden
@@ -123,8 +123,8 @@ def test_the_controller_errs_as_the_torch_student_does_on_the_same_trials(done: 
 
 def test_another_policy_errs_otherwise_on_the_same_trials(done: Job) -> None:
     source = exported_source(done.out)
-    (own,) = try_out_network(source.world, Still(), lambda: False)
-    (other,) = try_out_network(source.world, Leaning(), lambda: False)
+    _, (own,) = run_acceptance(source.world, lambda _: Still(), lambda: False)
+    _, (other,) = run_acceptance(source.world, lambda _: Leaning(), lambda: False)
     assert own.differs_from(own) == 0.0
     assert other.differs_from(own) > 0.01
 

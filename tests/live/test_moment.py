@@ -4,8 +4,8 @@ import mujoco
 import numpy as np
 import pytest
 
+from iowbc.live.drawing import collision_shapes, looks
 from iowbc.live.session import Session
-from iowbc.live.shapes import collision_shapes, looks
 from iowbc.robot.description import GRAVITY
 
 

@@ -12,9 +12,9 @@ from standing_still import StandingStill
 
 from iowbc.commands.options import HOST
 from iowbc.errors import UsageError
+from iowbc.evaluation.films import Actor
 from iowbc.evaluation.play import requested_episode
 from iowbc.evaluation.play_request import PlayRequest
-from iowbc.evaluation.side_by_side import Actor
 from iowbc.evaluation.trials.rollout import play_in
 from iowbc.live.drawing import ShownParts
 from iowbc.live.page import SETTLED, Page

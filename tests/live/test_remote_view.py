@@ -11,10 +11,10 @@ import psutil
 import pytest
 import viser
 
-from iowbc.live.moment import SimulationRecorder
 from iowbc.live.remote_view import RemoteView, draw
 from iowbc.live.server import LocalServer, serving
 from iowbc.live.session import Session
+from iowbc.live.track import SimulationRecorder
 from iowbc.sim.rendering.forces import Force
 
 

@@ -19,7 +19,7 @@ from exported_policies import made_up_generator, untrained
 
 from iowbc.deploy import contract, exported_folder
 from iowbc.errors import UsageError
-from iowbc.evaluation.acceptance import golden_inputs
+from iowbc.evaluation.exported import golden_inputs
 from iowbc.export import golden
 from iowbc.export.folder import write_folder
 from iowbc.export.onnx_graph import run_torch

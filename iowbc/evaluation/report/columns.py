@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from iowbc.evaluation.trials.errors import ERRORS
-from iowbc.evaluation.trials.transport import SHORTEST_WAY
+from iowbc.evaluation.trials.errors import ERRORS, SHORTEST_WAY
 from iowbc.results.table import ABSENT, FAILS, Cell, Column, Table, heads, measured
 
 STANDS_STILL = "stands still"
@@ -31,7 +30,7 @@ HEADS = {name: ERROR_HEADS[name] for name in ERRORS}
 class Entry:
     """One column of a table with a row per variant."""
 
-    column: Column
+    head: str | Column
     cell: Callable[[pd.Series], Cell]
     still: Callable[[pd.DataFrame], Cell] = lambda rows: ABSENT
     """Cell of a robot that stands still, from the rows of all variants."""
@@ -52,7 +51,7 @@ def variant_table(
     name: str, caption: str, first: str, entries: Sequence[Entry], rows: list[tuple[Cell, ...]], numbers: pd.DataFrame
 ) -> Table:
     """Table of the rows of `variant_rows`; `first`: head of the column of group names."""
-    return Table(name, caption, heads(first, "Algorithm", *(one.column for one in entries)), rows, numbers)
+    return Table(name, caption, heads(first, "Algorithm", *(one.head for one in entries)), rows, numbers)
 
 
 def still_row(entries: Sequence[Entry], rows: pd.DataFrame, name: str = "any") -> tuple[Cell, ...]:
@@ -82,7 +81,7 @@ def error_entry(name: str, part: str = "") -> Entry:
 
 def mean_entry(head: str, name: str, form: str, scale: float = 1.0) -> Entry:
     """Mean of a metric, times a factor; absent in trials of an earlier version without it."""
-    return Entry(Column(head), lambda row: measured(scale * row.get(name, np.nan), form=form))
+    return Entry(head, lambda row: measured(scale * row.get(name, np.nan), form=form))
 
 
 def transport_commanded(rows: pd.DataFrame) -> bool:
@@ -100,15 +99,15 @@ def _kept(row: pd.Series) -> str:
     return f"{row['kept']}/{row['pushed']}" if row["pushed"] else ABSENT if np.isnan(share) else f"{100 * share:.0f} %"
 
 
-SURVIVED = Entry(Column("Survived"), lambda row: f"{row['survived']}/{row['trials']}")
+SURVIVED = Entry("Survived", lambda row: f"{row['survived']}/{row['trials']}")
 SUCCESS = Entry(
-    Column("Success"),
+    "Success",
     lambda row: f"{row['succeeded']}/{row['trials']}",
     lambda rows: "none" if transport_commanded(rows) else ABSENT,
 )
 OUTCOME = (
     SURVIVED,
     SUCCESS,
-    Entry(Column("Transport"), _transport, lambda rows: "0.00" if transport_commanded(rows) else ABSENT),
-    Entry(Column("Kept"), _kept),
+    Entry("Transport", _transport, lambda rows: "0.00" if transport_commanded(rows) else ABSENT),
+    Entry("Kept", _kept),
 )

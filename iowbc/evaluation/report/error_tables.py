@@ -4,23 +4,9 @@ import numpy as np
 import pandas as pd
 
 from iowbc.evaluation.paper import TABLES, VARIANTS, reported
+from iowbc.evaluation.report import columns
 from iowbc.evaluation.report.aggregate import stepping_commanded, suites_of
 from iowbc.evaluation.report.captions import conditions, in_common, measures, regime
-from iowbc.evaluation.report.columns import (
-    ERROR_HEADS,
-    HEADS,
-    IDLE,
-    OUTCOME,
-    RAW,
-    SURVIVED,
-    Entry,
-    by_case,
-    error_entry,
-    still_error,
-    still_row,
-    variant_rows,
-    variant_table,
-)
 from iowbc.evaluation.trials.errors import ERRORS
 from iowbc.results.table import ABSENT, FAILS, Cell, Column, Table, measured
 
@@ -36,7 +22,7 @@ def error_table(summary: pd.DataFrame, suite: str, name: str | None = None) -> T
     chosen = summary[summary["suite"] == suite]
     kind = str(chosen["kind"].iloc[0])
     beside = in_paper(chosen)
-    entries = [*map(error_entry, ERROR_HEADS), *OUTCOME]
+    entries = [*map(columns.error_entry, columns.ERROR_HEADS), *columns.OUTCOME]
     entries += [_paper_entry(summary, error) for error in ERRORS] if beside else []
     rows = with_paper(chosen) if beside else chosen
     return _by_mass_or_case(name or slug(suite), _caption(chosen, kind, beside), entries, rows)
@@ -49,16 +35,16 @@ def moving_table(summary: pd.DataFrame, suite: str) -> Table:
         f"Command tracking errors in {suite} while a velocity is commanded: means over surviving trials with their "
         f"95 % interval. {conditions(chosen)} {measures(chosen)}"
     )
-    entries = [error_entry(name, "_moving") for name in ERROR_HEADS]
+    entries = [columns.error_entry(name, "_moving") for name in columns.ERROR_HEADS]
     return _by_mass_or_case(f"{slug(suite)}_moving", caption, entries, chosen)
 
 
 def paper_table(summary: pd.DataFrame) -> Table | None:
     """Cells of the paper's tables that were evaluated with walking: ours, the paper's and the ratio; None without."""
     entries = (
-        Entry(Column("Mass"), lambda row: f"{row['mass']:g} kg", lambda rows: "any"),
-        SURVIVED,
-        *(_ratio_entry(summary, name) for name in ERROR_HEADS),
+        columns.Entry("Mass", lambda row: f"{row['mass']:g} kg", lambda rows: "any"),
+        columns.SURVIVED,
+        *(_ratio_entry(summary, name) for name in columns.ERROR_HEADS),
     )
     rows: list[tuple[Cell, ...]] = []
     numbers: list[dict[str, object]] = []
@@ -70,8 +56,8 @@ def paper_table(summary: pd.DataFrame) -> Table | None:
         known = chosen[chosen["name_in_paper"].isin(VARIANTS)]
         of_paper = known[known["mass"].isin(TABLES[kind])]
         of_paper = pd.concat([own for _, own in of_paper.groupby("variant", sort=False)] or [of_paper])
-        found = variant_rows(entries, [(name, of_paper)])
-        rows += [*found, still_row(entries, chosen, name)] if found else []
+        found = columns.variant_rows(entries, [(name, of_paper)])
+        rows += [*found, columns.still_row(entries, chosen, name)] if found else []
         numbers += [
             {"suite": suite, "variant": row["variant"], "mass": row["mass"], "error": error, "ours": row[error]}
             | {"paper": row[f"paper_{error}"], "ratio": row[f"ratio_{error}"]}
@@ -88,9 +74,9 @@ def paper_table(summary: pd.DataFrame) -> Table | None:
     caption = (
         "Tables II and III cell by cell: our mean over surviving trials / the paper's value for its own commands = "
         f"ratio. {FAILS}: no trial survived. Cells of the paper in which ours is at most as large: "
-        f"{', '.join(counted)}. {IDLE} {in_common(summary)}"
+        f"{', '.join(counted)}. {columns.IDLE} {in_common(summary)}"
     )
-    return variant_table("paper", caption, "Table", entries, rows, frame)
+    return columns.variant_table("paper", caption, "Table", entries, rows, frame)
 
 
 def slug(suite: str) -> str:
@@ -112,20 +98,20 @@ def with_paper(rows: pd.DataFrame) -> pd.DataFrame:
     return rows.assign(**columns, **ratios)
 
 
-def _by_mass_or_case(name: str, caption: str, entries: list[Entry], chosen: pd.DataFrame) -> Table:
+def _by_mass_or_case(name: str, caption: str, entries: list[columns.Entry], chosen: pd.DataFrame) -> Table:
     """A table of a suite: by mass with one row of standing still, or by case with one in each."""
     if str(chosen["kind"].iloc[0]) not in SWEPT:
-        rows = variant_rows(entries, by_case(chosen), still=True)
-        return variant_table(name, caption, "Case", entries, rows, chosen)
+        rows = columns.variant_rows(entries, columns.by_case(chosen), still=True)
+        return columns.variant_table(name, caption, "Case", entries, rows, chosen)
     groups = [
         (f"{mass:g} kg" if case in set(chosen["suite"]) else str(case), group)
         for (case, mass), group in chosen.groupby(["case", "mass"], sort=False)
     ]
-    rows = [*variant_rows(entries, groups), still_row(entries, chosen)]
-    return variant_table(name, caption, "Mass", entries, rows, chosen)
+    rows = [*columns.variant_rows(entries, groups), columns.still_row(entries, chosen)]
+    return columns.variant_table(name, caption, "Mass", entries, rows, chosen)
 
 
-def _paper_entry(summary: pd.DataFrame, error: str) -> Entry:
+def _paper_entry(summary: pd.DataFrame, error: str) -> columns.Entry:
     """The paper's error, in brackets the ratio of ours to it and the notes of `regime`."""
 
     def cell(row: pd.Series) -> str:
@@ -136,22 +122,22 @@ def _paper_entry(summary: pd.DataFrame, error: str) -> Entry:
         said = ([] if np.isnan(ratio) else [f"{ratio:.2f}"]) + regime(summary, row, error)
         return f"{value:.3f} ({'; '.join(said)})" if said else f"{value:.3f}"
 
-    head = HEADS[error]
-    return Entry(Column(f"paper {head.name}", latex=f"paper {head.latex}", role="paper"), cell)
+    head = columns.ERROR_HEADS[error]
+    return columns.Entry(Column(f"paper {head.name}", latex=f"paper {head.latex}", role="paper"), cell)
 
 
-def _ratio_entry(summary: pd.DataFrame, error: str) -> Entry:
+def _ratio_entry(summary: pd.DataFrame, error: str) -> columns.Entry:
     """Our error, the paper's and the ratio; ours alone if the paper does not report the error."""
 
     def cell(row: pd.Series) -> Cell:
-        if error == RAW:
+        if error == columns.RAW:
             return measured(row[error], none=FAILS)
         ours, theirs = (measured(row[name], none=FAILS) for name in (error, f"paper_{error}"))
         beside = regime(summary, row, error) if np.isfinite(row[f"paper_{error}"]) else []
         ratio = measured(row[f"ratio_{error}"], form=".2f")
         return f"{ours} / {theirs} = {ratio}" + (f" ({'; '.join(beside)})" if beside else "")
 
-    return Entry(ERROR_HEADS[error], cell, lambda rows: still_error(rows, error))
+    return columns.Entry(columns.ERROR_HEADS[error], cell, lambda rows: columns.still_error(rows, error))
 
 
 def _caption(chosen: pd.DataFrame, kind: str, with_paper: bool) -> str:
@@ -166,6 +152,6 @@ def _caption(chosen: pd.DataFrame, kind: str, with_paper: bool) -> str:
         f"Command tracking errors under {title}: means over surviving trials with their 95 % interval. "
         f"{conditions(chosen)} {measures(chosen)} Transport: fractions of the commanded distance that robot / object "
         "cover; kept: fraction of the robot's part of the weight that its hands bear, or trials whose crate is not "
-        f"lost to a side; success: survived, with enough of both. {IDLE}"
+        f"lost to a side; success: survived, with enough of both. {columns.IDLE}"
         f"{failed}{aim if kind == 'stagnation' else ''}{beside if with_paper else ''}"
     )

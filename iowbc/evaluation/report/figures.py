@@ -15,10 +15,10 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from iowbc.arrays import Array
 from iowbc.evaluation.paper import TABLES, VARIANTS
 from iowbc.evaluation.report.aggregate import suites_of, variants_of
-from iowbc.evaluation.report.capacity import Capacities, load_capacities, masses_of, push_capacities
 from iowbc.evaluation.report.captions import conditions
 from iowbc.evaluation.report.columns import STANDS_STILL
 from iowbc.evaluation.report.error_tables import NUMBERS, SWEPT, in_paper
+from iowbc.evaluation.report.limits import Capacities, load_capacities, masses_of, push_capacities
 from iowbc.evaluation.trials.errors import ERRORS, error_norm
 from iowbc.results.picture import COLOURS
 

@@ -5,15 +5,11 @@ from pathlib import Path
 
 import pandas as pd
 
+from iowbc.evaluation.report import figures, interaction, limits
 from iowbc.evaluation.report.aggregate import TRAINING, aggregate, stepping_commanded, suites_of, with_trainings
-from iowbc.evaluation.report.capacity import capacity_table, push_table
-from iowbc.evaluation.report.compliance import compliance_figure, compliance_table, impedance_table
 from iowbc.evaluation.report.differences import difference_table
 from iowbc.evaluation.report.error_tables import SWEPT, error_table, moving_table, paper_table, slug
-from iowbc.evaluation.report.figures import comparison, errors_against_mass, robustness
 from iowbc.evaluation.report.interquartile import interquartile_table
-from iowbc.evaluation.report.other_tables import contact_table, heaviest, joint_table, success_table
-from iowbc.evaluation.report.push_map import MAP, map_figure, map_table
 from iowbc.results.picture import write_figure
 from iowbc.results.table import Table, write_table
 
@@ -31,15 +27,17 @@ def write_report(
     tables, summary = folder / "tables", aggregate(trials, labels)
     for table in report_tables(trials, summary, capacity_rate):
         write_table(table, tables)
-    pictures = {f"{slug(suite)}_errors": errors_against_mass(summary, suite) for suite in suites_of(summary, *SWEPT)}
+    pictures = {
+        f"{slug(suite)}_errors": figures.errors_against_mass(summary, suite) for suite in suites_of(summary, *SWEPT)
+    }
     if suites_of(summary, *SWEPT, "heavy"):
-        pictures["comparison"] = comparison(summary, capacity_rate)
+        pictures["comparison"] = figures.comparison(summary, capacity_rate)
     if suites_of(summary, "robustness", "stagnation", "pushes"):
-        pictures["robustness"] = robustness(summary, capacity_rate)
+        pictures["robustness"] = figures.robustness(summary, capacity_rate)
     if suites_of(summary, "compliance", "impedance"):
-        pictures["compliance"] = compliance_figure(summary)
-    if suites_of(summary, MAP):
-        pictures["push_map"] = map_figure(summary)
+        pictures["compliance"] = interaction.compliance_figure(summary)
+    if suites_of(summary, interaction.MAP):
+        pictures["push_map"] = interaction.map_figure(summary)
     for name, figure in pictures.items():
         write_figure(figure, folder / "figures" / f"{name}.png")
     summary.to_csv(tables / "summary.csv", index=False, float_format="%.9g")
@@ -51,21 +49,21 @@ def report_tables(trials: pd.DataFrame, summary: pd.DataFrame, capacity_rate: fl
     swept, kinds = suites_of(summary, *SWEPT), set(summary["kind"])
     walked = [suite for suite in swept if stepping_commanded(summary[summary["suite"] == suite])]
     several = len(with_trainings(trials)[["variant", TRAINING]].drop_duplicates()) > 1
-    survived = not heaviest(summary).empty
+    survived = not limits.heaviest(summary).empty
     tables = [
         *(error_table(summary, suite) for suite in swept),
         paper_table(summary),
         *(moving_table(summary, suite) for suite in walked),
         *(error_table(summary, suite) for suite in suites_of(summary, "stagnation", "robustness")),
-        success_table(summary) if "heavy" in kinds else None,
+        limits.success_table(summary) if "heavy" in kinds else None,
         error_table(summary, "heavy", name="heavy_errors") if "heavy" in kinds else None,
-        capacity_table(summary, capacity_rate) if swept else None,
-        push_table(summary, capacity_rate) if "pushes" in kinds else None,
-        compliance_table(summary) if "compliance" in kinds else None,
-        impedance_table(summary) if "impedance" in kinds else None,
-        map_table(summary) if MAP in kinds else None,
-        joint_table(summary) if survived else None,
-        contact_table(summary) if survived else None,
+        limits.capacity_table(summary, capacity_rate) if swept else None,
+        limits.push_table(summary, capacity_rate) if "pushes" in kinds else None,
+        interaction.compliance_table(summary) if "compliance" in kinds else None,
+        interaction.impedance_table(summary) if "impedance" in kinds else None,
+        interaction.map_table(summary) if interaction.MAP in kinds else None,
+        limits.joint_table(summary) if survived else None,
+        limits.contact_table(summary) if survived else None,
         difference_table(trials) if several else None,
         interquartile_table(trials) if several else None,
     ]

@@ -1,4 +1,4 @@
-"""The paper's tracking errors (eq. 9): means of absolute deviations from the command."""
+"""How a trial follows its commands: the paper's tracking errors (eq. 9), means of absolute deviations; transport."""
 
 from typing import NamedTuple
 
@@ -7,11 +7,13 @@ import numpy as np
 from iowbc.arrays import Array, Mask
 from iowbc.control.command import HEIGHT, PITCH, YAW_RATE
 from iowbc.recipe.task.commands import Commands
-from iowbc.robot.rotations import wrapped
+from iowbc.robot.rotations import turned, wrapped
 from iowbc.task.record.signals import Trace
 
 ERRORS = ("E_alpha", "E_h", "E_v", "E_psi")
 """The paper's four errors in the order of its columns: torso pitch [rad], height [m], velocity [m/s], heading [rad]."""
+SHORTEST_WAY = 0.1
+"""Minimum commanded distance for a transport metric [m]."""
 
 
 class Deviations(NamedTuple):
@@ -85,3 +87,38 @@ def error_norm(errors: Array) -> Array:
     """Euclidean norm of the paper's four errors in SI units, (..., 4) to (...): the simplest reading of its "norm
     error"."""
     return np.asarray(np.linalg.norm(errors, axis=-1))
+
+
+def commanded_path(given: Array, heading: float, dt: float) -> tuple[Array, float]:
+    """Directions of the commanded motion in the world frame, (T, 2), zero in standing, and path length [m].
+
+    given: commands (T, 11); heading: of the robot at the start [rad].
+    """
+    yaw = heading + dt * np.cumsum(given[:, YAW_RATE])
+    velocity, speed = turned(given[:, :2], yaw), np.hypot(given[:, 0], given[:, 1])
+    directions = np.divide(velocity, speed[:, None], out=np.zeros_like(velocity), where=speed[:, None] > 0)
+    return directions, float(speed.sum() * dt)
+
+
+def covered(position: Array, directions: Array, length: float) -> float:
+    """Fraction of a commanded path that a body covers; NaN for a path shorter than `SHORTEST_WAY`.
+
+    position: (T, 2 or more) [m]; directions: (T or more, 2) and length [m] of `commanded_path`. Covered distance is the
+    body's motion along the direction commanded at the time; swaying cancels and sideways motion does not count.
+    """
+    if length < SHORTEST_WAY:
+        return np.nan
+    steps = np.diff(position[:, :2], axis=0)
+    return float(np.sum(steps * directions[1 : len(position)]) / length)
+
+
+def beside(robot: Array, heading: Array, body: Array, moving: Mask) -> float:
+    """Largest lateral distance of a body from the robot while stepping is commanded [m]; NaN if it never is.
+
+    robot, body: (T, 2 or more) [m]; heading: (T,) [rad]; moving: (T,).
+    """
+    if not moving.any():
+        return np.nan
+    away = body[:, :2] - robot[:, :2]
+    aside = np.cos(heading) * away[:, 1] - np.sin(heading) * away[:, 0]
+    return float(np.max(np.abs(aside[moving])))

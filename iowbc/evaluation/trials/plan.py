@@ -15,8 +15,6 @@ from iowbc.recipe.simulation.partner import BEHAVIOURS
 from iowbc.recipe.task.commands import Commands
 from iowbc.task.episodes import CommandScript, CommandSegment, Episode, PlannedPull, PlannedPush
 
-NO_OBJECT = "no object"
-"""Case of a sweep in the scene without an object."""
 SPLITS = {"development": 0, "test": 2**33}
 """Seed offset of each split. All seeds of recipes are smaller, so that the splits never overlap."""
 UNDISTURBED = {"impulse_scale": 0.0, "push_scale": 0.0}
@@ -168,7 +166,7 @@ class PlannedSweep:
 
     def named(self) -> list[Trial]:
         """The trials that the recipe names: those without an object, and those at each mass."""
-        return (self.trials((0.0,), NO_OBJECT) if self.no_object else []) + self.trials(self.masses)
+        return (self.trials((0.0,), "no object") if self.no_object else []) + self.trials(self.masses)
 
     def trials(self, masses: Iterable[float], case: str | None = None) -> list[Trial]:
         """The trials at given masses [kg]; `case`: default the name of the suite."""

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from iowbc.evaluation.trials.metrics import trial_row
 from iowbc.evaluation.trials.plan import Trial, case_trials, compliance_trials, map_trials, planned_sweeps, push_trials
 from iowbc.evaluation.trials.rollout import PolicyInBatch, play_episodes
-from iowbc.evaluation.trials.table import trial_row
 from iowbc.files import newest_checked, write_checked
 from iowbc.learning.acting import Policy, load_policy
 from iowbc.recipe.recipe import Recipe

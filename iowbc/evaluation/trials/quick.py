@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from iowbc.evaluation.trials.errors import ERRORS
+from iowbc.evaluation.trials.metrics import trial_row
 from iowbc.evaluation.trials.plan import UNDISTURBED, Trial, planned_episode, script_for
 from iowbc.evaluation.trials.rollout import play_in
-from iowbc.evaluation.trials.table import trial_row
 from iowbc.learning.acting import Policy
 from iowbc.recipe.teacher import Check
 from iowbc.robot.description import load_robot

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 INTERRUPT_CHECK_INTERVAL = 25
 """Control steps between checks for an interrupt."""
+FAILURES = {"fallen": "fell", "dropped": "dropped"}
+"""Endings by the signals that report them, the graver one first."""
 
 
 @dataclass(frozen=True)
@@ -30,25 +32,14 @@ class Outcome:
     trace: Trace
     seconds: float
     """Duration until the end [s]."""
-    fallen: bool
-    dropped: bool
-    finished: bool
-    """True if the episode reached its time limit."""
+    ending: str
+    """One of `FAILURES`, "finished" at the time limit, or "diverged" if the simulation stopped without any of these."""
     drawn: Mapping[str, Array]
     """Random draws by name, each of shape (k,)."""
 
     @property
     def survived(self) -> bool:
-        return self.finished and not (self.fallen or self.dropped)
-
-    @property
-    def ending(self) -> str:
-        """Kind of termination; "diverged" if the simulation stopped without a fall or a drop."""
-        if self.fallen:
-            return "fell"
-        if self.dropped:
-            return "dropped"
-        return "finished" if self.finished else "diverged"
+        return self.ending == "finished"
 
 
 def playing(world: Specification, episodes: Sequence[Episode], workers: int = 0) -> "closing[VectorEnv]":
@@ -87,7 +78,7 @@ def play_in(
     policy.reset(np.ones(count, np.bool_))
     frames: list[dict[str, Array]] = []
     length = np.zeros(count, np.int64)
-    endings: dict[int, dict[str, bool]] = {}
+    endings: dict[int, str] = {}
     look(0.0)
     while not length.all():
         if len(frames) % INTERRUPT_CHECK_INTERVAL == 0:
@@ -102,25 +93,25 @@ def play_in(
             look(len(frames) * dt)
         for index in np.flatnonzero(done & (length == 0)).tolist():
             length[index] = len(frames)
-            endings[index] = {name: environment.signals[name].flat[index] > 0 for name in ("fallen", "dropped")}
-            endings[index]["finished"] = infos[index].get("TimeLimit.truncated", False)
+            failures = [word for name, word in FAILURES.items() if environment.signals[name].flat[index] > 0]
+            other = "finished" if infos[index].get("TimeLimit.truncated") else "diverged"
+            endings[index] = next(iter(failures), other)
         if done.any():
             policy.reset(done)
     recorded = {name: np.stack([frame[name].reshape(count, -1) for frame in frames]) for name in RECORDED}
     return [
         Outcome(
-            trace=trace_of(recorded, index, int(length[index]), dt),
+            trace=trace_of({name: values[: length[index], index] for name, values in recorded.items()}, dt),
             seconds=float(length[index] * dt),
+            ending=endings[index],
             drawn={name: values[index] for name, values in drawn.items()},
-            **{name: bool(flag) for name, flag in endings[index].items()},
         )
         for index in range(count)
     ]
 
 
-def trace_of(recorded: Mapping[str, Array], index: int, steps: int, dt: float) -> Trace:
-    """Trace of the first `steps` of one environment, from signals of shape (T, n, k) by name."""
-    rows = {name: values[:steps, index] for name, values in recorded.items()}
+def trace_of(rows: Mapping[str, Array], dt: float) -> Trace:
+    """Trace of one environment, from signals of shape (T, k) by name."""
     return Trace(dt=dt, **{name: row if row.shape[1] > 1 else row[:, 0] for name, row in rows.items()})
 
 

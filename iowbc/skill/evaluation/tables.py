@@ -25,7 +25,6 @@ COLUMNS = {
     "time": ("Time [s]", ".1f"),
 }
 """Metrics of an episode with column heading and number format, in table order."""
-SEEDS_OF_THE_BOOTSTRAP = 0
 
 
 def tables(games: pd.DataFrame, held_out: tuple[str, ...]) -> list[Table]:
@@ -120,7 +119,7 @@ def improvement(first: pd.DataFrame, other: pd.DataFrame) -> Bootstrapped:
 @cache
 def _resamples(trainings: int, units: int) -> tuple[Indices, Indices]:
     """Trainings (RESAMPLES, trainings, 1) and episodes (RESAMPLES, 1, units) of each resample, with replacement."""
-    generator = np.random.default_rng(SEEDS_OF_THE_BOOTSTRAP)
+    generator = np.random.default_rng(0)
     drawn = [[generator.integers(n, size=n) for n in (trainings, units)] for _ in range(RESAMPLES)]
     chosen, episodes = (np.stack(rows) for rows in zip(*drawn, strict=True))
     return chosen[:, :, None], episodes[:, None, :]
