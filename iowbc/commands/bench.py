@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
-import typer
+from typer import Argument, Option
 
 from iowbc.commands import options
 from iowbc.errors import IowbcError, UsageError, require_known
@@ -25,7 +25,7 @@ from iowbc.robot.description import robot_folder
 if TYPE_CHECKING:
     import pandas as pd
 
-BenchRecipe = Annotated[Path | None, typer.Argument(help="Recipe file (default: built-in values).", metavar="RECIPE")]
+BenchRecipe = Annotated[Path | None, Argument(help="Recipe file (default: built-in values).", metavar="RECIPE")]
 SUITES = {"mujoco": "carry.yaml", "drake": "carry_drake.yaml"}
 """Suite of each engine, in the folder `public` of the recipes."""
 NO_DRAKE = "not installed: pip install '.[drake]' in a checkout"
@@ -48,8 +48,8 @@ MEANING = (
 def sim(
     recipe: BenchRecipe = None,
     scene: options.SceneName = "lift",
-    environments: Annotated[int, typer.Option(help="Environments per worker.", min=1)] = 48,
-    workers: Annotated[list[int] | None, typer.Option(help="Worker processes (repeatable).", min=1)] = None,
+    environments: Annotated[int, Option(help="Environments per worker.", min=1)] = 48,
+    workers: Annotated[list[int] | None, Option(help="Worker processes (repeatable).", min=1)] = None,
     runs: options.RunsFolder = options.RUNS,
 ) -> None:
     """Measure the vector environment. Raises `UsageError`."""
@@ -63,7 +63,7 @@ def sim(
 def train(
     recipe: BenchRecipe = None,
     scene: options.SceneName = "lift",
-    turns: Annotated[int, typer.Option(help="Number of updates.", min=1)] = 6,
+    turns: Annotated[int, Option(help="Number of updates.", min=1)] = 6,
     runs: options.RunsFolder = options.RUNS,
 ) -> None:
     """Measure the teacher's training. Raises `UsageError`."""
@@ -75,8 +75,8 @@ def train(
 
 def control(
     what: options.Exported,
-    steps: Annotated[int, typer.Option(help="Number of control steps.", min=1)] = 5000,
-    skill: Annotated[Path | None, typer.Option(help="Folder of a skill that commands the controller.")] = None,
+    steps: Annotated[int, Option(help="Number of control steps.", min=1)] = 5000,
+    skill: Annotated[Path | None, Option(help="Folder of a skill that commands the controller.")] = None,
 ) -> None:
     """Measure the control step's time of an exported controller, and print it in quantiles."""
     from iowbc.deploy.timing import step_seconds
@@ -88,7 +88,7 @@ def control(
         print(f"{name:16}{median:>12}{late:>18}{longest:>12}")
 
 
-def engines(robot: Annotated[str, typer.Argument(help="Robot, by name or folder.", metavar="ROBOT")] = "g1") -> None:
+def engines(robot: Annotated[str, Argument(help="Robot, by name or folder.", metavar="ROBOT")] = "g1") -> None:
     """Compare MuJoCo and Drake. Raises `UsageError`, and `IowbcError` where they differ."""
     options.require_extra("train", "iowbc bench")
     from iowbc.benchmarks import engines
@@ -108,24 +108,22 @@ def _checked(runs: Path, file: Path | None, scene: str) -> Recipe:
 
 
 def carry(
-    policy: Annotated[
-        str, typer.Argument(help="Controller: a file, a folder, or PACKAGE:PATH of an installed package.")
-    ],
-    adapter: Annotated[str, typer.Option(help="Its adapter: a Python file, `holosoma` or `deploy`.", metavar="FILE")],
+    policy: Annotated[str, Argument(help="Controller: a file, a folder, or PACKAGE:PATH of an installed package.")],
+    adapter: Annotated[str, Option(help="Its adapter: a Python file, `holosoma` or `deploy`.", metavar="FILE")],
     arms: Annotated[
         Literal["measured", "default", "free", "own"],
-        typer.Option(
+        Option(
             help="Arms held by this project and observed as measured or in the controller's default posture; or moved "
             "by the controller in all trials (own) or in those without an object (free)."
         ),
     ] = "measured",
-    posture: Annotated[bool, typer.Option("--posture", help="Also send it commanded height and torso pitch.")] = False,
+    posture: Annotated[bool, Option("--posture", help="Also send it commanded height and torso pitch.")] = False,
     engine: Annotated[
         Literal["mujoco", "both"] | None,
-        typer.Option(help="MuJoCo alone, or some cells in Drake, too (default: both where Drake is installed)."),
+        Option(help="MuJoCo alone, or some cells in Drake, too (default: both where Drake is installed)."),
     ] = None,
     workers: options.Workers = None,
-    out: Annotated[Path, typer.Option(help="Output page.", metavar="FILE")] = Path("carry.md"),
+    out: Annotated[Path, Option(help="Output page.", metavar="FILE")] = Path("carry.md"),
 ) -> None:
     """Play the suites and write the page. Raises UsageError, and StageFailed where the controller cannot be used."""
     options.require_extra("train", "iowbc bench carry")

@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
 from rich.console import Console
 from rich.filesize import decimal
+from typer import Argument, Option
 
 from iowbc.commands import completion, options
 from iowbc.commands.diff import difference_lines
@@ -38,14 +38,10 @@ LONGEST_NAME = 100
 def compare(
     words: Annotated[
         list[str],
-        typer.Argument(
-            help="Two or more finished recipes, or a study.", metavar="RECIPE...", autocompletion=completion.ran
-        ),
+        Argument(help="Two or more finished recipes, or a study.", metavar="RECIPE...", autocompletion=completion.ran),
     ],
-    output: Annotated[Path | None, typer.Option(help="Output folder (default: runs/compare).")] = None,
-    film: Annotated[
-        bool, typer.Option("--film", help="Also record a film of one trial, all recipes side by side.")
-    ] = False,
+    output: Annotated[Path | None, Option(help="Output folder (default: runs/compare).")] = None,
+    film: Annotated[bool, Option("--film", help="Also record a film of one trial, all recipes side by side.")] = False,
     as_json: options.AsJson = False,
     runs: options.RunsFolder = options.RUNS,
 ) -> None:
@@ -103,12 +99,12 @@ def write_comparison(
 def report(
     words: Annotated[
         list[str],
-        typer.Argument(help="One or more finished recipes.", metavar="RECIPE...", autocompletion=completion.ran),
+        Argument(help="One or more finished recipes.", metavar="RECIPE...", autocompletion=completion.ran),
     ],
-    output: Annotated[Path | None, typer.Option(help="Output HTML file (default: runs/report/RECIPE.html).")] = None,
+    output: Annotated[Path | None, Option(help="Output HTML file (default: runs/report/RECIPE.html).")] = None,
     log: Annotated[
         Path | None,
-        typer.Option(help="Replay and plot this log of `iowbc robot RECIPE` instead (default output: MCAP.png)."),
+        Option(help="Replay and plot this log of `iowbc robot RECIPE` instead (default output: MCAP.png)."),
     ] = None,
     runs: options.RunsFolder = options.RUNS,
 ) -> None:

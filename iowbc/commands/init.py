@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Argument, Option
 
 from iowbc.commands.printed import shown_path, stdout_console, tell
 from iowbc.errors import UsageError
@@ -19,8 +19,8 @@ from iowbc.robot.description import robot_folder
 
 
 def init(
-    folder: Annotated[Path, typer.Argument(help="Folder to create or to fill.", metavar="DIR")],
-    robot: Annotated[str, typer.Option(help="Robot description to copy.")] = "g1",
+    folder: Annotated[Path, Argument(help="Folder to create or to fill.", metavar="DIR")],
+    robot: Annotated[str, Option(help="Robot description to copy.")] = "g1",
 ) -> None:
     """Copy what is not there yet, and print it. Raises `UsageError`, also where a file would be replaced."""
     source = robot_folder(robot)
@@ -52,7 +52,7 @@ def _content(path: Path) -> dict[str, bytes]:
     return {file.relative_to(path).as_posix(): file.read_bytes() for file in files}
 
 
-def schema(output: Annotated[Path | None, typer.Option(help="Output file (default: print).")] = None) -> None:
+def schema(output: Annotated[Path | None, Option(help="Output file (default: print).")] = None) -> None:
     """Write the schema, or print it. Raises `UsageError`."""
     text = json.dumps(recipe_schema(), indent=2, ensure_ascii=False) + "\n"
     if output is None:

@@ -3,13 +3,13 @@
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
 from rich.columns import Columns
 from rich.console import Console
 from rich.filesize import decimal
 from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
+from typer import Argument
 
 from iowbc.commands import completion, options
 from iowbc.commands.lookup import known_recipes, last_used, named
@@ -92,7 +92,7 @@ def _print_work(store: Store, console: Console, folder: Path, record: Progress) 
 
 def ls(
     stage: Annotated[
-        str | None, typer.Argument(help="Only artifacts of this stage.", autocompletion=completion.stages)
+        str | None, Argument(help="Only artifacts of this stage.", autocompletion=completion.stages)
     ] = None,
     as_json: options.AsJson = False,
     runs: options.RunsFolder = options.RUNS,

@@ -6,8 +6,8 @@ from contextlib import closing, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
 from rich.console import Console
+from typer import Argument, Option
 
 from iowbc.commands import completion, options
 from iowbc.commands.lookup import named, policy_of
@@ -33,33 +33,29 @@ if TYPE_CHECKING:
 def play(
     word: Annotated[
         str,
-        typer.Argument(
+        Argument(
             help="Recipe, RECIPE/STAGE, key, or export folder.", metavar="WHAT", autocompletion=completion.artifacts
         ),
     ],
-    stage: Annotated[
-        str | None, typer.Option(help="Stage whose policy is played (default: the last one available).")
-    ] = None,
+    stage: Annotated[str | None, Option(help="Stage whose policy is played (default: the last one available).")] = None,
     scene: options.SceneName = "lift",
     mass: Annotated[
         float | None,
-        typer.Option(help="Object mass [kg]; 0 removes the object (default: 4; drawn in a skill's game).", min=0.0),
+        Option(help="Object mass [kg]; 0 removes the object (default: 4; drawn in a skill's game).", min=0.0),
     ] = None,
     partner_share: Annotated[
         float | None,
-        typer.Option(
+        Option(
             help="Share of the weight that the partner bears (default: 0; drawn in a skill's game).", min=0.0, max=1.0
         ),
     ] = None,
     partner: Annotated[
         str | None,
-        typer.Option(help="Human of a skill's game (default: one not met in training).", metavar="BEHAVIOUR"),
+        Option(help="Human of a skill's game (default: one not met in training).", metavar="BEHAVIOUR"),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, max=2**32 - 1)] = 0,
-    disturbances: Annotated[bool, typer.Option("--disturbances", help="Enable random disturbances.")] = False,
-    video: Annotated[
-        Path | None, typer.Option(help="Record a film instead of opening a window.", metavar="MP4")
-    ] = None,
+    seed: Annotated[int, Option(min=0, max=2**32 - 1)] = 0,
+    disturbances: Annotated[bool, Option("--disturbances", help="Enable random disturbances.")] = False,
+    video: Annotated[Path | None, Option(help="Record a film instead of opening a window.", metavar="MP4")] = None,
     web: options.Web = False,
     port: options.Port = None,
     runs: options.RunsFolder = options.RUNS,

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
-import typer
 from rich.console import Console
+from typer import Exit, Option
 
 from iowbc.commands import completion, options
 from iowbc.commands.lookup import SWEEP_POINTS, SWEEP_TABLE, named, record_sweep
@@ -48,7 +48,7 @@ def sweep(
     recipe: options.RecipeFile,
     overrides: Annotated[
         list[str] | None,
-        typer.Option(
+        Option(
             "--set",
             help="Value to set, or values to vary (a,b or 0..4; repeat for a grid).",
             metavar="A.B.C=VALUES",
@@ -56,18 +56,18 @@ def sweep(
         ),
     ] = None,
     file: Annotated[
-        Path | None, typer.Option("--from", help="YAML file of a sweep: grid, random draws, or both.", metavar="YAML")
+        Path | None, Option("--from", help="YAML file of a sweep: grid, random draws, or both.", metavar="YAML")
     ] = None,
     jobs: Annotated[
         int | None,
-        typer.Option(help="Points run in parallel on shared cores (default: 1; with Ray: all cores).", min=1),
+        Option(help="Points run in parallel on shared cores (default: 1; with Ray: all cores).", min=1),
     ] = None,
-    points: Annotated[int, typer.Option(help="Maximum number of points.", min=1)] = MOST_POINTS,
+    points: Annotated[int, Option(help="Maximum number of points.", min=1)] = MOST_POINTS,
     until: options.Until = None,
-    workers: Annotated[int | None, typer.Option(help="Worker processes per point.", min=1)] = None,
+    workers: Annotated[int | None, Option(help="Worker processes per point.", min=1)] = None,
     engine: options.Engine = None,
     address: options.Address = None,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Show the plan without running it.")] = False,
+    dry_run: Annotated[bool, Option("--dry-run", help="Show the plan without running it.")] = False,
     on_code_change: options.OnCodeChange = "report",
     quiet: options.Quiet = False,
     runs: options.RunsFolder = options.RUNS,
@@ -86,7 +86,7 @@ def sweep(
         console.print(in_all(plans), highlight=False)
         return
     with ignoring_broken_outputs():
-        raise typer.Exit(run_sweep(request, found, planners, jobs, console, quiet))
+        raise Exit(run_sweep(request, found, planners, jobs, console, quiet))
 
 
 def _require_origins(asked: Request, planners: Sequence[Planner]) -> None:
