@@ -80,18 +80,13 @@ def metrics_table(groups: Sequence[Group]) -> Table:
     for stage, metric in ((stage, metric) for stage, metrics in names.items() for metric in metrics):
         values = [group.values(stage, metric) for group in groups]
         if len(groups) == 1 or any(not np.array_equal(np.unique(own), np.unique(values[0])) for own in values[1:]):
-            rows.append((stage, metric, *_cells(values)))
+            row: list[Cell] = [stage, metric, _cell(values[0])]
+            for own in values[1:]:  # a difference is empty where either is unknown
+                known = len(own) and len(values[0])
+                row += [_cell(own), figure(own.mean() - values[0].mean(), 3, "+") if known else ""]
+            rows.append(tuple(row))
     others = [head for group in groups[1:] for head in (Column(group.label, role="detail"), f"Δ {group.label}")]
     return Table("metrics", "", heads("stage", "metric", groups[0].label, *others), rows, grouped=False)
-
-
-def _cells(values: Sequence[NDArray[np.float64]]) -> list[Cell]:
-    """A metric of the first group, then of each other one with its difference to the first; empty where unknown."""
-    cells = [_cell(values[0])]
-    for own in values[1:]:
-        known = len(own) and len(values[0])
-        cells += [_cell(own), figure(own.mean() - values[0].mean(), 3, "+") if known else ""]
-    return cells
 
 
 def _cell(values: NDArray[np.float64]) -> Cell:
