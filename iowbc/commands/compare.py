@@ -13,8 +13,9 @@ from typer import Argument, Option
 from iowbc.commands import completion, options
 from iowbc.commands.diff import difference_lines
 from iowbc.commands.lookup import COMPARED, FILM, film_of, members_of, named, points_of, start_comparison
+from iowbc.commands.playable import evaluated_actor
 from iowbc.commands.printed import film_progress, print_json, shown_path, stdout_console, tell
-from iowbc.commands.results import PROBE, TRIALS, evaluated_actor, split_tables
+from iowbc.commands.results import PROBE, TRIALS, split_tables
 from iowbc.errors import UsageError
 from iowbc.pipeline.console.live_table import sparkline
 from iowbc.pipeline.store.last_used import require_whole

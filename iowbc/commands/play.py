@@ -1,8 +1,6 @@
 """`iowbc play`: shows or films a policy, or serves a page to drive it by hand and to replay its evaluation's trials."""
 
-import os
-from collections.abc import Mapping
-from contextlib import closing, suppress
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -10,22 +8,16 @@ from rich.console import Console
 from typer import Argument, Option
 
 from iowbc.commands import completion, options
-from iowbc.commands.lookup import named, policy_of
-from iowbc.commands.playable import named_source, planned, playable_skill, skill_to_play, whole_source
+from iowbc.commands.playable import driven, named_source, planned, playable_skill, skill_to_play
 from iowbc.commands.printed import film_progress, stdout_console, tell
 from iowbc.commands.process import close_on_termination
-from iowbc.commands.results import evaluated_actor
 from iowbc.errors import Interrupted, UsageError, require_known
 from iowbc.evaluation.play_request import PlayRequest
-from iowbc.pipeline.store.artifact import Artifact
-from iowbc.pipeline.store.last_used import require_whole
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
-from iowbc.report.runs import Run
 
 if TYPE_CHECKING:
     from iowbc.evaluation.play import Source
-    from iowbc.evaluation.side_by_side import Actor
     from iowbc.live.track import Played
     from iowbc.skill.single_game import SingleGame
 
@@ -107,7 +99,7 @@ def play(
     elif page is not None:
         from iowbc.live.session import Session
 
-        source, actor = _driven(store, console, word, stage, plan)
+        source, actor = driven(store, console, word, stage, plan)
         _serve(console, page, Session(source, request), evaluated=actor)
     else:
         _play_episode(named_source(store, console, word, stage, scene, plan), request, console)
@@ -155,23 +147,3 @@ def _play_game(console: Console, game: "SingleGame", title: str, video: Path | N
         console.print(str(stopped), markup=False, highlight=False)
         return
     tell(console, f"{game.ending.replace('_', ' ')} after {game.seconds:.1f} s{made}")
-
-
-def _driven(store: Store, console: Console, word: str, stage: str | None, plan: Run) -> "tuple[Source, Actor | None]":
-    """The policy to drive by hand, and the trials of its evaluation."""
-    found: Mapping[str, Artifact] = {}
-    if not os.path.isdir(word):
-        with suppress(UsageError):  # a first training has nothing finished yet
-            found = named(store, word).artifacts
-    evaluation = found.get("eval")
-    if evaluation is not None and len(found) == 1:
-        played = policy_of(store, evaluation)
-        require_whole(store.runs, [played])
-        source = whole_source(store, played)
-    else:
-        source = named_source(store, console, word, stage, None, plan)
-    try:
-        return source, None if evaluation is None else evaluated_actor(store, evaluation)
-    except UsageError as error:
-        tell(console, f"no trials to look through: {error}")
-        return source, None
