@@ -58,13 +58,17 @@ def planned(store: Store, word: str) -> Run:
 
 def skill_to_play(store: Store, word: str, stage: str | None, plan: Run = UNPLANNED) -> Artifact | None:
     """The skill that a word and `--stage` name; None where they name no skill, or another stage."""
-    if stage not in (None, SKILL) or os.path.isdir(word):
+    if stage not in (None, SKILL):
         return None
-    if plan.recipe:
-        return plan.artifacts.get(SKILL)
-    with contextlib.suppress(UsageError):  # a first training has nothing finished yet
-        return named(store, word).usable.get(SKILL)
-    return None
+    return plan.artifacts.get(SKILL) if plan.recipe else _finished(store, word).usable.get(SKILL)
+
+
+def _finished(store: Store, word: str) -> Run:
+    """What a word names; nothing for a folder, and where a first training has nothing finished yet."""
+    if not os.path.isdir(word):
+        with contextlib.suppress(UsageError):
+            return named(store, word)
+    return UNPLANNED
 
 
 def playable_skill(store: Store, skill: Artifact, scene: str) -> "tuple[Specification, Student, TeacherNetwork, str]":
@@ -175,10 +179,7 @@ def playable(store: Store, word: str, stage: str | None, plan: Run = UNPLANNED) 
 
 def driven(store: Store, console: Console, word: str, stage: str | None, plan: Run) -> "tuple[Source, Actor | None]":
     """The policy to drive by hand, and the trials of its evaluation."""
-    found: Mapping[str, Artifact] = {}
-    if not os.path.isdir(word):
-        with contextlib.suppress(UsageError):  # a first training has nothing finished yet
-            found = named(store, word).artifacts
+    found = _finished(store, word).artifacts
     evaluation = found.get("eval")
     if evaluation is not None and len(found) == 1:
         played = policy_of(store, evaluation)

@@ -127,12 +127,11 @@ def _stop_request() -> threading.Event:
 
 def report_checks(console: Console, found: list[CheckResult], waived: Collection[str]) -> None:
     """Print the checks. Raises UsageError for failed ones that are not waived, and for those that cannot be."""
+    failed = [check for check in found if not check.passed and not (check.waivable and check.name in waived)]
     table = plain_table("check", "", "found")
     for check in found:
-        verdict = "ok" if check.passed else "waived" if check.name in waived and check.waivable else "FAILED"
-        table.add_row(check.name, verdict, check.text)
+        table.add_row(check.name, "ok" if check.passed else "FAILED" if check in failed else "waived", check.text)
     console.print(table)
-    failed = [check for check in found if not check.passed and not (check.waivable and check.name in waived)]
     if failed:
         names, (first, *_) = ", ".join(check.name for check in failed), failed
         other = f", or pass --waive {first.name} if you know why" if first.waivable else ""

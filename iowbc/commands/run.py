@@ -179,8 +179,6 @@ def run_recipe(
 def _display(loaded: LoadedRecipe, console: Console, stopping: Callable[[], str], manner: Manner) -> Display:
     if manner == "quiet":
         return Display()
-    if manner == "verbose":
-        return PlainDisplay(0.0, console.file)
-    if console.is_terminal:
+    if manner == "usual" and console.is_terminal:
         return LiveTable(console, stopping)
-    return PlainDisplay(loaded.recipe.execution.line_interval, console.file)
+    return PlainDisplay(0.0 if manner == "verbose" else loaded.recipe.execution.line_interval, console.file)
