@@ -214,7 +214,7 @@ def results_of(sweep: Sweep, found: Mapping[str, Run]) -> tuple[Table, dict[str,
     return Table(sweep.name, caption, columns, rows, grouped=False), means
 
 
-def _chosen(runs: Sequence[Run]) -> list[tuple[str, str]]:
+def _chosen(runs: Sequence[Run]) -> Sequence[tuple[str, str]]:
     """Stage and name of the main metrics in which points differ, of many those of the last stages; if none differs,
     those of the last stage."""
     found = (
