@@ -211,7 +211,7 @@ def _with_unique_labels(
 
 
 def report_joint(found: Sequence[Run], output: Path, missing: Sequence[str] = (), least: int = 1) -> None:
-    """Write tables and figures over all trials of the runs, if at least so many have trials, a shared evaluation once;
+    """Write tables and figures over all trials of the runs, a shared evaluation once, if `least` runs or more have any;
     also of all probed runs: how well the object's mass can be read from their histories. `missing`: recipes of the
     study that have not run. Raises `UsageError` where the runs count masses differently."""
     import pandas as pd
