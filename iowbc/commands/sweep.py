@@ -18,7 +18,7 @@ from iowbc.commands.plan import in_all, plan_table, planned
 from iowbc.commands.points import Endings, PointProcess, PointRun, PointThread, run_points
 from iowbc.commands.printed import shown_path, stdout_console, tell
 from iowbc.commands.process import DONE, INTERRUPTED, STAGE_FAILED, RunEnding, ignoring_broken_outputs
-from iowbc.commands.request import Request, in_order, point_planners
+from iowbc.commands.request import Request, in_order, prepared
 from iowbc.commands.results import headline
 from iowbc.commands.run import requested_cluster, run_recipe
 from iowbc.errors import UsageError
@@ -31,7 +31,7 @@ from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.tracking.tracker import RunRecord, sweep_record
 from iowbc.processes import available_cores
 from iowbc.recipe.recipe import PIPELINE, SEEDS
-from iowbc.recipe.sweep import MOST_POINTS, Sweep, written
+from iowbc.recipe.sweep import MOST_POINTS, Sweep, load_sweep, written
 from iowbc.report.runs import Run
 from iowbc.results.table import Cell, Table, drawn, heads, markdown, measured
 
@@ -79,7 +79,8 @@ def sweep(
     further += ["--points", str(points)] if points != MOST_POINTS else []
     request = Request(recipe, overrides or (), Runs(runs), settings, "sweep", further)
     console = stdout_console()
-    found, planners = point_planners(request, file, points)
+    found = load_sweep(recipe, request.overrides, file, points)
+    planners = [prepared(point.loaded, request.runs, settings) for point in found.points]
     if dry_run:
         plans = planned(planners)
         console.print(plan_table(plans, "point"))
@@ -105,7 +106,7 @@ def run_sweep(
     asked: Request, found: Sweep, planners: Sequence[Planner], jobs: int | None, console: Console, quiet: bool
 ) -> int:
     """Run all points, even if some fail; returns the exit code. Raises `UsageError` if another recipe has to run first.
-    found, planners: see `point_planners`; jobs: see `_shared_out`."""
+    planners: of the points; jobs: see `_shared_out`."""
     _require_origins(asked, planners)
     runs, execution = asked.runs, planners[0].loaded.recipe.execution
     options.require_extra("train", "iowbc sweep")
