@@ -1,4 +1,4 @@
-"""The command line: name, module and help of every command.
+"""The command line: name, help and module of every command.
 
 A command's module is imported when the command is called or completed, so that `iowbc --help` is fast.
 """
@@ -19,50 +19,38 @@ from iowbc.commands.process import described, leave, let_go, prepare_streams, re
 from iowbc.processes import name_glfw
 
 COMMANDS = {
-    "run": ("run", "Run a recipe: run every stage that is not cached, and resume interrupted ones."),
-    "sweep": ("sweep", "Run a recipe with every combination of given values; shared stages run once."),
-    "plan": ("plan", "Show whether each stage is cached or would run, the reason, and the expected time."),
-    "publish": (
-        "publish",
-        "Copy a recipe's finished artifacts to the repository (runs/published), where a fresh clone finds them.",
-    ),
-    "init": ("init", "Copy the recipes and a robot description into a folder of your own."),
-    "status": ("listing", "Show running and unfinished stages, and the artifacts of each recipe."),
-    "ls": ("listing", "List the stored artifacts."),
-    "show": ("listing", "Show an artifact in detail, or the stages and metrics of a recipe."),
-    "diff": ("diff", "Show how two recipes or artifacts differ: recipe, keys, versions, code, metrics."),
-    "compare": ("compare", "Compare several runs in tables and figures."),
-    "report": (
-        "compare",
-        "Write one HTML page about runs: tables, interactive curves, films, differences; readable offline.",
-    ),
-    "export": ("export", "Write a web page that simulates an exported controller in the browser (needs npm)."),
-    "gc": ("gc", "Remove artifacts and checkpoints, selected by at least one option."),
-    "play": ("play", "Watch a trained policy in the viewer, drive it in the browser, or record a film."),
-    "robot": (
-        "robot",
-        "Drive a robot on its bus with an exported controller; never tried on hardware, see docs/deployment.md.",
-    ),
-    "robot-sim": ("robot", "Simulate a robot on the bus, which `iowbc robot` can drive."),
-    "ui": ("ui", "Open MLflow's web interface for the runs, on this machine only."),
-    "schema": ("schema", "Write the JSON Schema of recipes, for editors."),
-    "doctor": ("doctor", "Check versions, binaries, rendering, cores, memory and disk."),
+    "run": "Run a recipe: run every stage that is not cached, and resume interrupted ones.",
+    "sweep": "Run a recipe with every combination of given values; shared stages run once.",
+    "plan": "Show whether each stage is cached or would run, the reason, and the expected time.",
+    "publish": "Copy a recipe's finished artifacts to the repository (runs/published), where a fresh clone finds them.",
+    "init": "Copy the recipes and a robot description into a folder of your own.",
+    "status": "Show running and unfinished stages, and the artifacts of each recipe.",
+    "ls": "List the stored artifacts.",
+    "show": "Show an artifact in detail, or the stages and metrics of a recipe.",
+    "diff": "Show how two recipes or artifacts differ: recipe, keys, versions, code, metrics.",
+    "compare": "Compare several runs in tables and figures.",
+    "report": "Write one HTML page about runs: tables, interactive curves, films, differences; readable offline.",
+    "export": "Write a web page that simulates an exported controller in the browser (needs npm).",
+    "gc": "Remove artifacts and checkpoints, selected by at least one option.",
+    "play": "Watch a trained policy in the viewer, drive it in the browser, or record a film.",
+    "robot": "Drive a robot on its bus with an exported controller; never tried on hardware, see docs/deployment.md.",
+    "robot-sim": "Simulate a robot on the bus, which `iowbc robot` can drive.",
+    "ui": "Open MLflow's web interface for the runs, on this machine only.",
+    "schema": "Write the JSON Schema of recipes, for editors.",
+    "doctor": "Check versions, binaries, rendering, cores, memory and disk.",
 }
-"""Module in `iowbc.commands` and help of each command, in the order of `iowbc --help`."""
+"""Help of each command, in the order of `iowbc --help`."""
 BENCHMARKS = {
-    "sim": ("bench", "Measure the vector environment's speed against a bare MuJoCo loop; results go to MLflow."),
-    "train": ("bench", "Measure the teacher's training speed against plain stable-baselines3; results go to MLflow."),
-    "control": (
-        "bench",
-        "Measure the control step's time of an exported controller on one thread, without torch or a simulator.",
-    ),
-    "carry": (
-        "bench_carry",
-        "Evaluate a public controller on a fixed suite of lifts and pushes, and write a page of results.",
-    ),
-    "engines": ("bench", "Compare MuJoCo and Drake in experiments where they must agree; needs the extra `drake`."),
+    "sim": "Measure the vector environment's speed against a bare MuJoCo loop; results go to MLflow.",
+    "train": "Measure the teacher's training speed against plain stable-baselines3; results go to MLflow.",
+    "control": "Measure the control step's time of an exported controller on one thread, without torch or a simulator.",
+    "carry": "Evaluate a public controller on a fixed suite of lifts and pushes, and write a page of results.",
+    "engines": "Compare MuJoCo and Drake in experiments where they must agree; needs the extra `drake`.",
 }
 """The same of `iowbc bench`."""
+MODULES = {"status": "listing", "ls": "listing", "show": "listing", "report": "compare", "robot-sim": "robot"}
+MODULES |= {"schema": "init"} | dict.fromkeys(BENCHMARKS, "bench")
+"""Modules in `iowbc.commands` of commands without one of their name."""
 
 
 class LazyCommand(TyperCommand):
@@ -76,9 +64,9 @@ class LazyCommand(TyperCommand):
         return get_command(command).make_context(*arguments, **settings)
 
 
-def _importing(module: str, name: str) -> Callable[[], Any]:
+def _importing(name: str) -> Callable[[], Any]:
     """A function that imports and returns the function of a command, which has the command's name."""
-    return lambda: resolve_name(f"iowbc.commands.{module}:{name.replace('-', '_')}")
+    return lambda: resolve_name(f"iowbc.commands.{MODULES.get(name, name)}:{name.replace('-', '_')}")
 
 
 app = typer.Typer(
@@ -95,8 +83,8 @@ bench = typer.Typer(
 )
 app.add_typer(bench, name="bench")
 for group, commands in ((app, COMMANDS), (bench, BENCHMARKS)):
-    for name, (module, text) in commands.items():
-        group.command(name, cls=LazyCommand, help=text)(_importing(module, name))
+    for name, text in commands.items():
+        group.command(name, cls=LazyCommand, help=text)(_importing(name))
 
 
 def _print_version(asked: bool) -> None:

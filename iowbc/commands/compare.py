@@ -6,23 +6,23 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
 from rich.console import Console
 from rich.filesize import decimal
+from typer import Argument, Option
 
 from iowbc.commands import completion, options
 from iowbc.commands.diff import difference_lines
 from iowbc.commands.lookup import COMPARED, FILM, film_of, members_of, named, points_of, start_comparison
+from iowbc.commands.playable import evaluated_actor
 from iowbc.commands.printed import film_progress, print_json, shown_path, stdout_console, tell
-from iowbc.commands.results import PROBE, TRIALS, evaluated_actor, split_tables
+from iowbc.commands.results import PROBE, TRIALS, split_tables
 from iowbc.errors import UsageError
 from iowbc.pipeline.console.display import sparkline
-from iowbc.pipeline.nested import flattened
 from iowbc.pipeline.store.last_used import require_whole
 from iowbc.pipeline.store.runs import Runs, require_writable
 from iowbc.pipeline.store.store import Store
-from iowbc.report.runs import Group, Run, grouped, metrics_table
-from iowbc.results.table import ABSENT, Table, drawn, heads, markdown, read_tables, write_table
+from iowbc.report.runs import Group, Run, grouped, metrics_table, trainings_table
+from iowbc.results.table import Table, drawn, markdown, read_tables, write_table
 from iowbc.stages.registry import STAGES
 
 if TYPE_CHECKING:
@@ -39,14 +39,10 @@ LONGEST_NAME = 100
 def compare(
     words: Annotated[
         list[str],
-        typer.Argument(
-            help="Two or more finished recipes, or a study.", metavar="RECIPE...", autocompletion=completion.ran
-        ),
+        Argument(help="Two or more finished recipes, or a study.", metavar="RECIPE...", autocompletion=completion.ran),
     ],
-    output: Annotated[Path | None, typer.Option(help="Output folder (default: runs/compare).")] = None,
-    film: Annotated[
-        bool, typer.Option("--film", help="Also record a film of one trial, all recipes side by side.")
-    ] = False,
+    output: Annotated[Path | None, Option(help="Output folder (default: runs/compare).")] = None,
+    film: Annotated[bool, Option("--film", help="Also record a film of one trial, all recipes side by side.")] = False,
     as_json: options.AsJson = False,
     runs: options.RunsFolder = options.RUNS,
 ) -> None:
@@ -74,9 +70,7 @@ def write_comparison(
     metrics = metrics_table(grouped(found))
     (output / "metrics.md").write_text(markdown(metrics), encoding="utf-8")
     missing = [name for name in members_of(study) if name not in {run.label for run in tried}]
-    _report_probes(found, output)
-    if len(tried) > 1 or (tried and study):
-        report_joint(tried, output, missing)
+    report_joint(found, output, missing, least=1 if study else 2)
     if film:
         _film(store, console, tried, output / FILM, quiet=as_json)
     curves = _learning_curves(found, output)
@@ -106,12 +100,12 @@ def write_comparison(
 def report(
     words: Annotated[
         list[str],
-        typer.Argument(help="One or more finished recipes.", metavar="RECIPE...", autocompletion=completion.ran),
+        Argument(help="One or more finished recipes.", metavar="RECIPE...", autocompletion=completion.ran),
     ],
-    output: Annotated[Path | None, typer.Option(help="Output HTML file (default: runs/report/RECIPE.html).")] = None,
+    output: Annotated[Path | None, Option(help="Output HTML file (default: runs/report/RECIPE.html).")] = None,
     log: Annotated[
         Path | None,
-        typer.Option(help="Replay and plot this log of `iowbc robot RECIPE` instead (default output: MCAP.png)."),
+        Option(help="Replay and plot this log of `iowbc robot RECIPE` instead (default output: MCAP.png)."),
     ] = None,
     runs: options.RunsFolder = options.RUNS,
 ) -> None:
@@ -160,10 +154,8 @@ def _joined(store: Store, found: Sequence[Run]) -> tuple[list[Table], dict[str, 
     if len(evaluated) < 2:
         return [table for one in evaluated for table in read_tables(one.folder / "tables")], {}
     with tempfile.TemporaryDirectory() as folder:
-        output, tried = Path(folder), _having(found, TRIALS)
-        _report_probes(found, output)
-        if tried:
-            report_joint(tried, output)
+        output = Path(folder)
+        report_joint(found, output)
         film = film_of(store.runs, [run.label for run in found])
         media = [*sorted((output / "figures").glob("*.png")), *([film] if film else [])]
         return read_tables(output / "tables"), {path.name: path.read_bytes() for path in media}
@@ -218,25 +210,21 @@ def _with_unique_labels(
     return [tables[run.label] for run in runs], labels
 
 
-def _report_probes(found: Sequence[Run], output: Path) -> None:
-    """Write the report of all probed runs: how well the object's mass can be read from their histories."""
+def report_joint(found: Sequence[Run], output: Path, missing: Sequence[str] = (), least: int = 1) -> None:
+    """Write tables and figures over all trials of the runs, a shared evaluation once, if `least` runs or more have any;
+    also of all probed runs: how well the object's mass can be read from their histories. `missing`: recipes of the
+    study that have not run. Raises `UsageError` where the runs count masses differently."""
     import pandas as pd
 
     from iowbc.evaluation.report.probe import write_probe
-
-    if runs := _having(found, PROBE):
-        write_probe(pd.concat(_with_unique_labels(runs, PROBE, together=False)[0], ignore_index=True), output)
-
-
-def report_joint(runs: Sequence[Run], output: Path, missing: Sequence[str] = ()) -> None:
-    """Write tables and figures over all trials of the runs, a shared evaluation once; `missing`: recipes of the study
-    that have not run. Raises `UsageError` where the runs count masses differently."""
-    import pandas as pd
-
     from iowbc.evaluation.report.report import write_report
 
+    if probed := _having(found, PROBE):
+        write_probe(pd.concat(_with_unique_labels(probed, PROBE, together=False)[0], ignore_index=True), output)
+    if len(tried := _having(found, TRIALS)) < least:
+        return
     first = dict[Path, Run]()
-    for run in runs:
+    for run in tried:
         first.setdefault(run.artifacts["eval"].folder, run)
     runs = [*first.values()]
     trials, labels = _with_unique_labels(runs, TRIALS)
@@ -247,39 +235,6 @@ def report_joint(runs: Sequence[Run], output: Path, missing: Sequence[str] = ())
         )
     write_report(pd.concat(trials, ignore_index=True), output, float(rates.pop()), labels)
     write_table(trainings_table(grouped(runs), missing), output / "tables")
-
-
-def trainings_table(groups: Sequence[Group], missing: Sequence[str] = ()) -> Table:
-    """Length and seed of each training behind a comparison, a row for each run; `missing`: as in `report_joint`."""
-    import pandas as pd
-
-    used = {stage for group in groups for run in group.runs for stage in run.recipe.get("stages", ())}
-    named = [STAGES[name] for name in STAGES if name in used | {"teacher", "distill"}]
-    methods = {stage.name: stage.trained_by for stage in named if stage.trained_by}
-    numbers = [
-        {"recipe": run.label, "algorithm": str(run.recipe["eval"]["label"]), "seed": seed}
-        | {stage: _steps_of(run, stage) for stage in methods}
-        for group in groups
-        for run, seed in zip(group.runs, group.seeds, strict=True)
-    ]
-    rows = [
-        tuple(ABSENT if n is None else f"{n:,}" if isinstance(n, int) else n for n in one.values()) for one in numbers
-    ]
-    rows += [(name, "not evaluated yet", *[ABSENT] * (1 + len(methods))) for name in missing]
-    columns = heads("Recipe", "Algorithm", "Seed", *(f"Steps of {method}" for method in methods.values()))
-    budget = "" if len({row["teacher"] for row in numbers}) == 1 else "not "
-    lacking = f" Missing: {', '.join(missing)}." if missing else ""
-    caption = f"What was trained, {budget}all with the same budget of PPO.{lacking}"
-    return Table("trainings", caption, columns, rows, pd.DataFrame(numbers))
-
-
-def _steps_of(run: Run, stage: str) -> int | None:
-    """Environment steps of a stage that trains; None where the run has no such stage."""
-    if stage not in run.recipe.get("stages", ()):
-        return None
-    made = run.artifacts[stage].recipe if stage in run.artifacts else run.recipe
-    (counted, *_) = STAGES[stage].counts or (f"{stage}.steps",)
-    return int(flattened(made)[counted])
 
 
 def film_joint(store: Store, console: Console, runs: Sequence[Run], output: Path) -> None:

@@ -10,9 +10,9 @@ from collections.abc import Iterator
 from typing import Literal, NamedTuple
 
 import psutil
-import typer
 from packaging.requirements import Requirement
 from rich.text import Text
+from typer import Exit
 
 from iowbc.commands import options
 from iowbc.commands.printed import plain_table, stdout_console
@@ -79,7 +79,7 @@ def doctor(runs: options.RunsFolder = options.RUNS) -> None:
     console.print(table)
     fit = all(one.verdict != "bad" for one in found)
     console.print("fit to run recipes" if fit else "not fit to run recipes: see the lines marked bad", highlight=False)
-    raise typer.Exit(0 if fit else 1)
+    raise Exit(0 if fit else 1)
 
 
 def findings(runs: Runs) -> Iterator[Finding]:

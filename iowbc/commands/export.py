@@ -6,8 +6,8 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated
 
-import typer
 from rich.filesize import decimal
+from typer import Argument, Option
 
 from iowbc.commands import completion, options
 from iowbc.commands.lookup import named
@@ -21,11 +21,11 @@ from iowbc.pipeline.store.store import Store
 def export(
     word: Annotated[
         str,
-        typer.Argument(
+        Argument(
             help="Recipe, RECIPE/export, key, or export folder.", metavar="WHAT", autocompletion=completion.artifacts
         ),
     ],
-    folder: Annotated[Path, typer.Option("--web", help="Output folder of the web page.", metavar="DIR")],
+    folder: Annotated[Path, Option("--web", help="Output folder of the web page.", metavar="DIR")],
     runs: options.RunsFolder = options.RUNS,
 ) -> None:
     """Write the web page of an exported controller, and print how to open it. Raises `UsageError`."""

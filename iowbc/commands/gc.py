@@ -8,8 +8,8 @@ from pathlib import Path
 from secrets import token_hex
 from typing import Annotated, Any
 
-import typer
 from rich.filesize import decimal
+from typer import Option
 
 from iowbc.commands import options
 from iowbc.commands.lookup import known_recipes, last_used
@@ -34,15 +34,15 @@ LONG_STAGE = 3600.0
 
 
 def gc(
-    unused: Annotated[bool, typer.Option("--unused", help="Remove artifacts that no recipe ever used.")] = False,
+    unused: Annotated[bool, Option("--unused", help="Remove artifacts that no recipe ever used.")] = False,
     recipes: Annotated[
         list[str] | None,
-        typer.Option("--recipe", help="Remove this recipe's record and the artifacts that only it uses."),
+        Option("--recipe", help="Remove this recipe's record and the artifacts that only it uses."),
     ] = None,
-    work: Annotated[bool, typer.Option("--work", help="Remove checkpoints of unfinished stages.")] = False,
-    damaged: Annotated[bool, typer.Option("--damaged", help="Remove artifacts set aside as damaged.")] = False,
-    older_than: Annotated[float, typer.Option(help="Minimum age of removed items.", min=0.0, metavar="DAYS")] = 0.0,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="List the removals without removing anything.")] = False,
+    work: Annotated[bool, Option("--work", help="Remove checkpoints of unfinished stages.")] = False,
+    damaged: Annotated[bool, Option("--damaged", help="Remove artifacts set aside as damaged.")] = False,
+    older_than: Annotated[float, Option(help="Minimum age of removed items.", min=0.0, metavar="DAYS")] = 0.0,
+    dry_run: Annotated[bool, Option("--dry-run", help="List the removals without removing anything.")] = False,
     runs: options.RunsFolder = options.RUNS,
 ) -> None:
     """Remove what the options select, or list it. Raises `UsageError` if they select nothing.

@@ -1,23 +1,26 @@
-"""`iowbc init`: recipes and a robot description in a folder of the user's own."""
+"""`iowbc init` and `iowbc schema`: recipes, a robot description and the recipes' schema in the user's own folder."""
 
+import json
 import shlex
 import shutil
+import sys
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Argument, Option
 
 from iowbc.commands.printed import shown_path, stdout_console, tell
 from iowbc.errors import UsageError
 from iowbc.files import replacing
 from iowbc.pipeline.store.runs import require_writable
 from iowbc.recipe.reading.loading import known_files
+from iowbc.recipe.recipe import recipe_schema
 from iowbc.robot.description import robot_folder
 
 
 def init(
-    folder: Annotated[Path, typer.Argument(help="Folder to create or to fill.", metavar="DIR")],
-    robot: Annotated[str, typer.Option(help="Robot description to copy.")] = "g1",
+    folder: Annotated[Path, Argument(help="Folder to create or to fill.", metavar="DIR")],
+    robot: Annotated[str, Option(help="Robot description to copy.")] = "g1",
 ) -> None:
     """Copy what is not there yet, and print it. Raises `UsageError`, also where a file would be replaced."""
     source = robot_folder(robot)
@@ -47,3 +50,15 @@ def _content(path: Path) -> dict[str, bytes]:
     """The content of a file, or of all files below a folder, by relative path."""
     files = (file for file in (path, *path.rglob("*")) if file.is_file())
     return {file.relative_to(path).as_posix(): file.read_bytes() for file in files}
+
+
+def schema(output: Annotated[Path | None, Option(help="Output file (default: print).")] = None) -> None:
+    """Write the schema, or print it. Raises `UsageError`."""
+    text = json.dumps(recipe_schema(), indent=2, ensure_ascii=False) + "\n"
+    if output is None:
+        sys.stdout.write(text)
+        return
+    try:
+        output.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise UsageError(f"--output {output}: cannot be written: {error.strerror}; name another file") from None

@@ -1,19 +1,19 @@
 """`iowbc status`, `iowbc ls` and `iowbc show`: work in progress, stored artifacts, and one of them in detail."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
-import typer
 from rich.columns import Columns
 from rich.console import Console
 from rich.filesize import decimal
 from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
+from typer import Argument
 
 from iowbc.commands import completion, options
 from iowbc.commands.lookup import known_recipes, last_used, named
-from iowbc.commands.printed import artifact_data, plain_table, print_json, shown_path, stdout_console, tell
+from iowbc.commands.printed import plain_table, print_json, shown_path, stdout_console, tell
 from iowbc.errors import UsageError, require_known, shown
 from iowbc.pipeline.console.display import sparkline
 from iowbc.pipeline.console.wording import KEY_LENGTH, ago, duration, figure
@@ -92,7 +92,7 @@ def _print_work(store: Store, console: Console, folder: Path, record: Progress) 
 
 def ls(
     stage: Annotated[
-        str | None, typer.Argument(help="Only artifacts of this stage.", autocompletion=completion.stages)
+        str | None, Argument(help="Only artifacts of this stage.", autocompletion=completion.stages)
     ] = None,
     as_json: options.AsJson = False,
     runs: options.RunsFolder = options.RUNS,
@@ -107,7 +107,7 @@ def ls(
             users.setdefault(key, []).append(recipe)
     artifacts = store.artifacts(stage)
     if as_json:
-        print_json(console, [artifact_data(one) | {"used_by": users.get(one.manifest.key, [])} for one in artifacts])
+        print_json(console, [_data(one) | {"used_by": users.get(one.manifest.key, [])} for one in artifacts])
         return
     table = plain_table("stage", "key", "used by", "made", "took", "size")
     for artifact in artifacts:
@@ -131,7 +131,7 @@ def show(word: options.Named, as_json: options.AsJson = False, runs: options.Run
     store, console = Store(Runs(runs)), stdout_console()
     found = named(store, word)
     if as_json:
-        artifacts = [artifact_data(one) | {"ingredients": one.ingredients} for one in found.artifacts.values()]
+        artifacts = [_data(one) | {"ingredients": one.ingredients} for one in found.artifacts.values()]
         print_json(console, {"recipe": found.recipe, "stages": artifacts} if found.recipe else artifacts)
         return
     if found.recipe:
@@ -143,10 +143,6 @@ def show(word: options.Named, as_json: options.AsJson = False, runs: options.Run
             console.print(Padding(Columns(cells, padding=(0, 2), equal=True, column_first=True), (0, 0, 0, 2)))
         return
     (artifact,) = found.artifacts.values()
-    _show_artifact(store, artifact, console)
-
-
-def _show_artifact(store: Store, artifact: Artifact, console: Console) -> None:
     manifest, ingredients = artifact.manifest, artifact.ingredients
     inputs = ingredients.get("inputs", {})
     usual, own = flattened(Recipe(name="default").model_dump(mode="json")), flattened(ingredients.get("recipe", {}))
@@ -171,3 +167,18 @@ def _show_artifact(store: Store, artifact: Artifact, console: Console) -> None:
     console.print(grid)
     folder = named_folder(store.runs, manifest.recipe, manifest.stage, artifact.folder)
     tell(console, f"folder  {shown_path(folder)}")
+
+
+def _data(artifact: Artifact) -> dict[str, Any]:
+    """An artifact for other programs."""
+    manifest = artifact.manifest
+    own = {"stage", "key", "version", "recipe", "made", "seconds", "attempts", "workers", "host", "versions"}
+    return {
+        **manifest.model_dump(include=own),
+        "content": manifest.digest,
+        "folder": shown_path(artifact.folder),
+        "published": artifact.published,
+        "bytes": artifact.size,
+        "files": {name: record.size for name, record in manifest.files.items()},
+        "metrics": artifact.metrics,
+    }

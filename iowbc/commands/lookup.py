@@ -1,4 +1,4 @@
-"""Lookup of artifacts, recipes and trainings by name, and of the inputs that an artifact was made from."""
+"""Lookup of artifacts, recipes and trainings by name, and the records of sweeps and comparisons."""
 
 import contextlib
 import json
@@ -14,7 +14,7 @@ from iowbc.deploy.exported_folder import SHORTEST_PREFIX
 from iowbc.errors import UsageError, nearest
 from iowbc.files import write_whole
 from iowbc.pipeline.store.artifact import Artifact
-from iowbc.pipeline.store.last_used import LastUsed, recall, require_results
+from iowbc.pipeline.store.last_used import LastUsed, recall
 from iowbc.pipeline.store.runs import Runs, read_json
 from iowbc.pipeline.store.store import Store
 from iowbc.recipe.reading.loading import SUFFIXES, load_recipe, recipe_file
@@ -23,9 +23,7 @@ from iowbc.recipe.recipe import PIPELINE, Recipe
 from iowbc.recipe.section import deciding
 from iowbc.recipe.sweep import Sweep
 from iowbc.report.runs import Run
-from iowbc.robot.description import robot_folder
 from iowbc.stages.registry import STAGES
-from iowbc.task.specification import Specification
 
 SWEEP_RECORD, COMPARISON_RECORD = "sweep.json", "runs.json"
 """Files of a sweep with its points, and of a comparison with its runs."""
@@ -217,40 +215,6 @@ def film_of(runs: Runs, words: Sequence[str]) -> Path | None:
     return None
 
 
-def input_of(store: Store, artifact: Artifact, stage: str) -> Artifact | None:
-    """The input of a stage that an artifact was made from, or None. Raises `UsageError` if it is gone."""
-    manifest = artifact.manifest
-    return input_artifact(store, artifact.ingredients, stage, f"{manifest.stage} {manifest.key[:12]}")
-
-
-def input_artifact(store: Store, ingredients: Mapping[str, Any], stage: str, what: str) -> Artifact | None:
-    """The artifact of a stage among the ingredients of the key of `what`. Raises `UsageError` if it is gone."""
-    digest = ingredients.get("inputs", {}).get(stage)
-    if digest is None:
-        return None
-    found = next((one for one in store.artifacts(stage) if one.manifest.digest == digest), None)
-    if found is None:
-        raise UsageError(
-            f"the {stage} (content {digest[:12]}) that {what} was made from is no longer stored; run its recipe again"
-        )
-    return found
-
-
-def policy_of(store: Store, evaluation: Artifact) -> Artifact:
-    """The policy that an evaluation played. Raises `UsageError`."""
-    for name, stage in reversed(STAGES.items()):
-        if stage.trained_by and (policy := input_of(store, evaluation, name)) is not None:
-            require_results(store.runs, policy)
-            return policy
-    raise UsageError(f"{evaluation.folder}: this evaluation read no policy; run its recipe again")
-
-
 def policy_stages() -> list[str]:
     """Stages that leave a policy, the one to prefer first."""
     return [name for name, stage in reversed(STAGES.items()) if stage.leaves_policy]
-
-
-def world_of(resolved: Mapping[str, Any], generator: Artifact | None) -> Specification:
-    """The world of a resolved recipe; `generator`: the reference generator that its policy was trained on."""
-    recipe = Recipe.model_validate(resolved)
-    return Specification(recipe, robot_folder(recipe.robot), None if generator is None else generator.folder)

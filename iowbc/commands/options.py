@@ -5,7 +5,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Literal
 
-import typer
+from typer import Argument, Option
 
 from iowbc.commands import completion
 from iowbc.errors import UsageError
@@ -48,7 +48,7 @@ RUNS = Path("runs")
 """Folder of artifacts and tracking data where no other is given."""
 RunsFolder = Annotated[
     Path,
-    typer.Option(
+    Option(
         "--runs",
         help="Folder of artifacts and tracking data (default: $IOWBC_RUNS or ./runs).",
         envvar="IOWBC_RUNS",
@@ -56,45 +56,37 @@ RunsFolder = Annotated[
     ),
 ]
 RecipeFile = Annotated[
-    str, typer.Argument(help="Recipe: a YAML file or its name.", metavar="RECIPE", autocompletion=completion.recipes)
+    str, Argument(help="Recipe: a YAML file or its name.", metavar="RECIPE", autocompletion=completion.recipes)
 ]
 Overrides = Annotated[
     list[str] | None,
-    typer.Option(
+    Option(
         "--set", help="Override a recipe value (repeatable).", metavar="A.B.C=VALUE", autocompletion=completion.paths
     ),
 ]
-Until = Annotated[
-    str | None, typer.Option(help="Stop after this stage.", metavar="STAGE", autocompletion=completion.stages)
-]
+Until = Annotated[str | None, Option(help="Stop after this stage.", metavar="STAGE", autocompletion=completion.stages)]
 Force = Annotated[
     list[str] | None,
-    typer.Option(
+    Option(
         help="Re-run this stage even if it is cached (repeatable).", metavar="STAGE", autocompletion=completion.stages
     ),
 ]
-Workers = Annotated[int | None, typer.Option(help="Worker processes (default: all available cores).", min=1)]
-Engine = Annotated[
-    Literal["local", "ray"] | None, typer.Option(help="Execution engine: local processes or a Ray cluster.")
-]
-Address = Annotated[
-    str | None, typer.Option(help="Ray cluster: local, auto, HOST:PORT, ray://HOST:PORT.", metavar="ADDRESS")
-]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]
-OnCodeChange = Annotated[
-    Literal["report", "rerun"], typer.Option(help="Policy for cached stages whose code has changed.")
-]
-Web = Annotated[bool, typer.Option("--web", help="Interactive viewer in the browser (no display needed).")]
-Port = Annotated[int | None, typer.Option(help="Port of --web (default: 8080).", min=1, max=65535)]
-SceneName = Annotated[str, typer.Option("--scene", help="Scene of the recipe.", metavar="SCENE")]
-AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+Workers = Annotated[int | None, Option(help="Worker processes (default: all available cores).", min=1)]
+Engine = Annotated[Literal["local", "ray"] | None, Option(help="Execution engine: local processes or a Ray cluster.")]
+Address = Annotated[str | None, Option(help="Ray cluster: local, auto, HOST:PORT, ray://HOST:PORT.", metavar="ADDRESS")]
+Quiet = Annotated[bool, Option("--quiet", "-q", help="Print errors only.")]
+OnCodeChange = Annotated[Literal["report", "rerun"], Option(help="Policy for cached stages whose code has changed.")]
+Web = Annotated[bool, Option("--web", help="Interactive viewer in the browser (no display needed).")]
+Port = Annotated[int | None, Option(help="Port of --web (default: 8080).", min=1, max=65535)]
+SceneName = Annotated[str, Option("--scene", help="Scene of the recipe.", metavar="SCENE")]
+AsJson = Annotated[bool, Option("--json", help="Print JSON.")]
 Exported = Annotated[
     str,
-    typer.Argument(help="Export folder, or the recipe that made it.", metavar="EXPORT", autocompletion=completion.ran),
+    Argument(help="Export folder, or the recipe that made it.", metavar="EXPORT", autocompletion=completion.ran),
 ]
 Named = Annotated[
     str,
-    typer.Argument(
+    Argument(
         help="Recipe (name or file), RECIPE/STAGE, or the first characters of a key.",
         metavar="WHAT",
         autocompletion=completion.artifacts,

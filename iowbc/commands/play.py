@@ -1,30 +1,22 @@
 """`iowbc play`: shows or films a policy, or serves a page to drive it by hand and to replay its evaluation's trials."""
 
-import os
-from collections.abc import Mapping
-from contextlib import closing, suppress
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
 from rich.console import Console
+from typer import Argument, Option
 
 from iowbc.commands import completion, options
-from iowbc.commands.lookup import named, policy_of
-from iowbc.commands.playable import named_source, planned, playable_skill, skill_to_play, whole_source
+from iowbc.commands.playable import driven, named_source, planned, playable_skill, skill_to_play
 from iowbc.commands.printed import film_progress, stdout_console, tell
 from iowbc.commands.process import close_on_termination
-from iowbc.commands.results import evaluated_actor
 from iowbc.errors import Interrupted, UsageError, require_known
 from iowbc.evaluation.play_request import PlayRequest
-from iowbc.pipeline.store.artifact import Artifact
-from iowbc.pipeline.store.last_used import require_whole
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
-from iowbc.report.runs import Run
 
 if TYPE_CHECKING:
-    from iowbc.evaluation.films import Actor
     from iowbc.evaluation.play import Source
     from iowbc.live.session import Played
     from iowbc.skill.single_game import SingleGame
@@ -33,33 +25,29 @@ if TYPE_CHECKING:
 def play(
     word: Annotated[
         str,
-        typer.Argument(
+        Argument(
             help="Recipe, RECIPE/STAGE, key, or export folder.", metavar="WHAT", autocompletion=completion.artifacts
         ),
     ],
-    stage: Annotated[
-        str | None, typer.Option(help="Stage whose policy is played (default: the last one available).")
-    ] = None,
+    stage: Annotated[str | None, Option(help="Stage whose policy is played (default: the last one available).")] = None,
     scene: options.SceneName = "lift",
     mass: Annotated[
         float | None,
-        typer.Option(help="Object mass [kg]; 0 removes the object (default: 4; drawn in a skill's game).", min=0.0),
+        Option(help="Object mass [kg]; 0 removes the object (default: 4; drawn in a skill's game).", min=0.0),
     ] = None,
     partner_share: Annotated[
         float | None,
-        typer.Option(
+        Option(
             help="Share of the weight that the partner bears (default: 0; drawn in a skill's game).", min=0.0, max=1.0
         ),
     ] = None,
     partner: Annotated[
         str | None,
-        typer.Option(help="Human of a skill's game (default: one not met in training).", metavar="BEHAVIOUR"),
+        Option(help="Human of a skill's game (default: one not met in training).", metavar="BEHAVIOUR"),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, max=2**32 - 1)] = 0,
-    disturbances: Annotated[bool, typer.Option("--disturbances", help="Enable random disturbances.")] = False,
-    video: Annotated[
-        Path | None, typer.Option(help="Record a film instead of opening a window.", metavar="MP4")
-    ] = None,
+    seed: Annotated[int, Option(min=0, max=2**32 - 1)] = 0,
+    disturbances: Annotated[bool, Option("--disturbances", help="Enable random disturbances.")] = False,
+    video: Annotated[Path | None, Option(help="Record a film instead of opening a window.", metavar="MP4")] = None,
     web: options.Web = False,
     port: options.Port = None,
     runs: options.RunsFolder = options.RUNS,
@@ -111,7 +99,7 @@ def play(
     elif page is not None:
         from iowbc.live.session import Session
 
-        source, actor = _driven(store, console, word, stage, plan)
+        source, actor = driven(store, console, word, stage, plan)
         _serve(console, page, Session(source, request), evaluated=actor)
     else:
         _play_episode(named_source(store, console, word, stage, scene, plan), request, console)
@@ -159,23 +147,3 @@ def _play_game(console: Console, game: "SingleGame", title: str, video: Path | N
         console.print(str(stopped), markup=False, highlight=False)
         return
     tell(console, f"{game.ending.replace('_', ' ')} after {game.seconds:.1f} s{made}")
-
-
-def _driven(store: Store, console: Console, word: str, stage: str | None, plan: Run) -> "tuple[Source, Actor | None]":
-    """The policy to drive by hand, and the trials of its evaluation."""
-    found: Mapping[str, Artifact] = {}
-    if not os.path.isdir(word):
-        with suppress(UsageError):  # a first training has nothing finished yet
-            found = named(store, word).artifacts
-    evaluation = found.get("eval")
-    if evaluation is not None and len(found) == 1:
-        played = policy_of(store, evaluation)
-        require_whole(store.runs, [played])
-        source = whole_source(store, played)
-    else:
-        source = named_source(store, console, word, stage, None, plan)
-    try:
-        return source, None if evaluation is None else evaluated_actor(store, evaluation)
-    except UsageError as error:
-        tell(console, f"no trials to look through: {error}")
-        return source, None

@@ -1,15 +1,17 @@
-"""Lookup of what `iowbc play` plays: a policy with its world, or a skill with its controller."""
+"""Lookup of what is played: a policy with its world, a skill with its controller, and the inputs of their artifacts."""
 
 import contextlib
 import os
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
-from iowbc.commands.lookup import input_artifact, input_of, name_in, named, policy_stages, world_of
+from iowbc.commands.lookup import name_in, named, policy_stages
 from iowbc.commands.printed import tell
 from iowbc.commands.request import prepared
+from iowbc.commands.results import TRIALS
 from iowbc.deploy.exported_folder import CONTRACT
 from iowbc.errors import UsageError, require_known
 from iowbc.pipeline.console.wording import ago
@@ -24,11 +26,16 @@ from iowbc.recipe.evaluation.evaluation import Evaluation
 from iowbc.recipe.reading.loading import SUFFIXES, load_recipe
 from iowbc.recipe.recipe import Recipe
 from iowbc.report.runs import Run
+from iowbc.robot.description import robot_folder
+from iowbc.stages.eval import acting_stage
 from iowbc.stages.inputs import policy_stage
 from iowbc.stages.registry import STAGES
 from iowbc.task.specification import Specification
 
 if TYPE_CHECKING:
+    import pandas as pd
+
+    from iowbc.evaluation.films import Actor
     from iowbc.evaluation.play import Source
     from iowbc.learning.networks import TeacherNetwork
     from iowbc.skill.lower_layer import Student
@@ -51,13 +58,17 @@ def planned(store: Store, word: str) -> Run:
 
 def skill_to_play(store: Store, word: str, stage: str | None, plan: Run = UNPLANNED) -> Artifact | None:
     """The skill that a word and `--stage` name; None where they name no skill, or another stage."""
-    if stage not in (None, SKILL) or os.path.isdir(word):
+    if stage not in (None, SKILL):
         return None
-    if plan.recipe:
-        return plan.artifacts.get(SKILL)
-    with contextlib.suppress(UsageError):  # a first training has nothing finished yet
-        return named(store, word).usable.get(SKILL)
-    return None
+    return plan.artifacts.get(SKILL) if plan.recipe else _finished(store, word).usable.get(SKILL)
+
+
+def _finished(store: Store, word: str) -> Run:
+    """What a word names; nothing for a folder, and where a first training has nothing finished yet."""
+    if not os.path.isdir(word):
+        with contextlib.suppress(UsageError):
+            return named(store, word)
+    return UNPLANNED
 
 
 def playable_skill(store: Store, skill: Artifact, scene: str) -> "tuple[Specification, Student, TeacherNetwork, str]":
@@ -164,3 +175,69 @@ def playable(store: Store, word: str, stage: str | None, plan: Run = UNPLANNED) 
     chosen = stage or next((name for name in ready if found[name].whole), ready[0])
     require_results(store.runs, found[chosen])
     return found[chosen]
+
+
+def driven(store: Store, console: Console, word: str, stage: str | None, plan: Run) -> "tuple[Source, Actor | None]":
+    """The policy to drive by hand, and the trials of its evaluation."""
+    found = _finished(store, word).artifacts
+    evaluation = found.get("eval")
+    if evaluation is not None and len(found) == 1:
+        played = policy_of(store, evaluation)
+        require_whole(store.runs, [played])
+        source = whole_source(store, played)
+    else:
+        source = named_source(store, console, word, stage, None, plan)
+    try:
+        return source, None if evaluation is None else evaluated_actor(store, evaluation)
+    except UsageError as error:
+        tell(console, f"no trials to look through: {error}")
+        return source, None
+
+
+def evaluated_actor(store: Store, artifact: Artifact, trials: "pd.DataFrame | None" = None) -> "Actor":
+    """The actor of an artifact of `eval`; `trials`: its table, if it is read already. Raises `UsageError`."""
+    import pandas as pd
+
+    from iowbc.evaluation.films import Actor
+    from iowbc.evaluation.trials.protocol import evaluated_policy, evaluated_world
+
+    if trials is None and not (artifact.folder / TRIALS).is_file():
+        raise UsageError(f"{artifact.folder} has none: its recipe asks for a probe alone")
+    table = pd.read_parquet(artifact.folder / TRIALS) if trials is None else trials
+    world = evaluated_world(world_of(artifact.recipe, input_of(store, artifact, "rg-fit")))
+    policy = policy_of(store, artifact).folder if acting_stage(world.recipe) else None
+    return Actor(world, evaluated_policy(world, policy), table)
+
+
+def input_of(store: Store, artifact: Artifact, stage: str) -> Artifact | None:
+    """The input of a stage that an artifact was made from, or None. Raises `UsageError` if it is gone."""
+    manifest = artifact.manifest
+    return input_artifact(store, artifact.ingredients, stage, f"{manifest.stage} {manifest.key[:12]}")
+
+
+def input_artifact(store: Store, ingredients: Mapping[str, Any], stage: str, what: str) -> Artifact | None:
+    """The artifact of a stage among the ingredients of the key of `what`. Raises `UsageError` if it is gone."""
+    digest = ingredients.get("inputs", {}).get(stage)
+    if digest is None:
+        return None
+    found = next((one for one in store.artifacts(stage) if one.manifest.digest == digest), None)
+    if found is None:
+        raise UsageError(
+            f"the {stage} (content {digest[:12]}) that {what} was made from is no longer stored; run its recipe again"
+        )
+    return found
+
+
+def policy_of(store: Store, evaluation: Artifact) -> Artifact:
+    """The policy that an evaluation played. Raises `UsageError`."""
+    for name, stage in reversed(STAGES.items()):
+        if stage.trained_by and (policy := input_of(store, evaluation, name)) is not None:
+            require_results(store.runs, policy)
+            return policy
+    raise UsageError(f"{evaluation.folder}: this evaluation read no policy; run its recipe again")
+
+
+def world_of(resolved: Mapping[str, Any], generator: Artifact | None) -> Specification:
+    """The world of a resolved recipe; `generator`: the reference generator that its policy was trained on."""
+    recipe = Recipe.model_validate(resolved)
+    return Specification(recipe, robot_folder(recipe.robot), None if generator is None else generator.folder)

@@ -12,8 +12,6 @@ from pydantic_core import to_json
 from rich.console import Console
 from rich.table import Table
 
-from iowbc.pipeline.store.artifact import Artifact
-
 FOLDED = ("metrics", "finished stages", "used by", "recipe", "point", "why", "found")
 """Columns whose text may go on in the next line."""
 NARROW = 72
@@ -76,18 +74,3 @@ def film_progress(console: Console, film: Path | None) -> Callable[[float, float
             tell(console, f"{film}: {seconds:.0f} of {duration:.0f} s")
 
     return say
-
-
-def artifact_data(artifact: Artifact) -> dict[str, Any]:
-    """An artifact for other programs."""
-    manifest = artifact.manifest
-    own = {"stage", "key", "version", "recipe", "made", "seconds", "attempts", "workers", "host", "versions"}
-    return {
-        **manifest.model_dump(include=own),
-        "content": manifest.digest,
-        "folder": shown_path(artifact.folder),
-        "published": artifact.published,
-        "bytes": artifact.size,
-        "files": {name: record.size for name, record in manifest.files.items()},
-        "metrics": artifact.metrics,
-    }

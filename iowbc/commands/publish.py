@@ -2,8 +2,8 @@
 
 from typing import Annotated
 
-import typer
 from rich.filesize import decimal
+from typer import Option
 
 from iowbc.commands import options
 from iowbc.commands.printed import shown_path, stdout_console, tell
@@ -23,7 +23,7 @@ def publish(
     until: options.Until = None,
     without: Annotated[
         list[str] | None,
-        typer.Option(
+        Option(
             help="File to leave out (repeatable); state.safetensors is needed only to extend a training.",
             metavar="FILE",
         ),

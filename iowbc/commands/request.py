@@ -14,7 +14,6 @@ from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
 from iowbc.recipe.reading.loading import LoadedRecipe, load_recipe
 from iowbc.recipe.reading.study import load_study
-from iowbc.recipe.sweep import Sweep, load_sweep
 from iowbc.reference.ranges import wrong_ranges
 from iowbc.robot.description import Robot, load_robot, robot_folder
 from iowbc.stages.registry import STAGES
@@ -54,15 +53,6 @@ def planners(request: Request) -> list[Planner]:
         raise RecipeError([Problem(f"--force {min(request.options.force)}", text)])
     found = variants or (load_recipe(request.word, request.overrides),)
     return [prepared(loaded, request.runs, request.options) for loaded in found]
-
-
-def point_planners(asked: Request, file: Path | None, most: int) -> tuple[Sweep, list[Planner]]:
-    """The points of a sweep, at most `most`, and their planners; `file`: with further axes. Raises `RecipeError`."""
-    if asked.options.force:
-        text = "names a stage that points may share; force it in one of them with `iowbc run`"
-        raise RecipeError([Problem(f"--force {min(asked.options.force)}", text)])
-    found = load_sweep(asked.word, asked.overrides, file, most)
-    return found, [prepared(point.loaded, asked.runs, asked.options) for point in found.points]
 
 
 def prepared(loaded: LoadedRecipe, runs: Runs, options: Options) -> Planner:

@@ -1,31 +1,23 @@
-"""Results of a run: films, chosen metrics, tables, the next commands; and an evaluation with its policy."""
+"""Results of a run: films, chosen metrics, tables, the next commands."""
 
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.text import Text
 
-from iowbc.commands.lookup import input_of, last_used, policy_of, policy_stages, world_of
+from iowbc.commands.lookup import last_used, policy_stages
 from iowbc.commands.printed import shown_path, tell
 from iowbc.deploy.exported_folder import STEP
-from iowbc.errors import UsageError
 from iowbc.pipeline.console.wording import KEY_LENGTH, figure
 from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.last_used import named_folder, recall
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
 from iowbc.results.table import Table, drawn, read_tables
-from iowbc.stages.eval import acting_stage
 from iowbc.stages.registry import STAGES
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from iowbc.evaluation.films import Actor
 
 METRICS_SHOWN = 3
 """Maximum number of metrics shown per stage."""
@@ -113,18 +105,3 @@ def split_tables(tables: Sequence[Table]) -> tuple[list[Table], list[Table]]:
 
 def _rank(name: str) -> tuple[int, str]:
     return TABLES.index(name) if name in TABLES else len(TABLES), name
-
-
-def evaluated_actor(store: Store, artifact: Artifact, trials: "pd.DataFrame | None" = None) -> "Actor":
-    """The actor of an artifact of `eval`; `trials`: its table, if it is read already. Raises `UsageError`."""
-    import pandas as pd
-
-    from iowbc.evaluation.films import Actor
-    from iowbc.evaluation.trials.protocol import evaluated_policy, evaluated_world
-
-    if trials is None and not (artifact.folder / TRIALS).is_file():
-        raise UsageError(f"{artifact.folder} has none: its recipe asks for a probe alone")
-    table = pd.read_parquet(artifact.folder / TRIALS) if trials is None else trials
-    world = evaluated_world(world_of(artifact.recipe, input_of(store, artifact, "rg-fit")))
-    policy = policy_of(store, artifact).folder if acting_stage(world.recipe) else None
-    return Actor(world, evaluated_policy(world, policy), table)

@@ -7,8 +7,8 @@ from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-import typer
 from rich.console import Console
+from typer import Option
 
 from iowbc.commands import options
 from iowbc.commands.printed import plain_table, stdout_console, tell
@@ -29,13 +29,13 @@ LISTENING = 3.0
 """Time of listening to the bus before the checks [s]; the battery's state should arrive once or twice per second."""
 POLLING = 5
 """Periods of the bus between two looks for a request of the page."""
-Network = Annotated[str, typer.Option(help="Network interface: lo for this machine, eth0 or another for a robot.")]
-Domain = Annotated[int, typer.Option(help="DDS domain; the G1's is 0.", min=0, max=230)]
-Scene = Annotated[str, typer.Option(help="Scene, which sets grasp and expected load.", metavar="SCENE")]
+Network = Annotated[str, Option(help="Network interface: lo for this machine, eth0 or another for a robot.")]
+Domain = Annotated[int, Option(help="DDS domain; the G1's is 0.", min=0, max=230)]
+Scene = Annotated[str, Option(help="Scene, which sets grasp and expected load.", metavar="SCENE")]
 InStep = Annotated[
-    bool, typer.Option("--lockstep", help="Synchronise with the other process step by step, on a busy machine.")
+    bool, Option("--lockstep", help="Synchronise with the other process step by step, on a busy machine.")
 ]
-Seconds = Annotated[float, typer.Option(help="End after this time [s].", min=0.0)]
+Seconds = Annotated[float, Option(help="End after this time [s].", min=0.0)]
 
 
 def robot(
@@ -44,14 +44,14 @@ def robot(
     domain: Domain = 0,
     scene: Scene = "free",
     commands: Annotated[
-        str, typer.Option(help="Source of commands: remote, keyboard or udp:PORT.", metavar="SOURCE")
+        str, Option(help="Source of commands: remote, keyboard or udp:PORT.", metavar="SOURCE")
     ] = "keyboard",
     object_pose: Annotated[
-        str | None, typer.Option(help="Source of the object's pose: udp:PORT (default: with the commands).")
+        str | None, Option(help="Source of the object's pose: udp:PORT (default: with the commands).")
     ] = None,
-    log: Annotated[Path | None, typer.Option(help="Log every message to this new file.", metavar="MCAP")] = None,
-    waive: Annotated[list[str] | None, typer.Option(help="Ignore a failure of this check (repeatable).")] = None,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Check the robot and send no motor command.")] = False,
+    log: Annotated[Path | None, Option(help="Log every message to this new file.", metavar="MCAP")] = None,
+    waive: Annotated[list[str] | None, Option(help="Ignore a failure of this check (repeatable).")] = None,
+    dry_run: Annotated[bool, Option("--dry-run", help="Check the robot and send no motor command.")] = False,
     lockstep: InStep = False,
     seconds: Seconds = float("inf"),
 ) -> None:
@@ -127,12 +127,11 @@ def _stop_request() -> threading.Event:
 
 def report_checks(console: Console, found: list[CheckResult], waived: Collection[str]) -> None:
     """Print the checks. Raises UsageError for failed ones that are not waived, and for those that cannot be."""
+    failed = [check for check in found if not check.passed and not (check.waivable and check.name in waived)]
     table = plain_table("check", "", "found")
     for check in found:
-        verdict = "ok" if check.passed else "waived" if check.name in waived and check.waivable else "FAILED"
-        table.add_row(check.name, verdict, check.text)
+        table.add_row(check.name, "ok" if check.passed else "FAILED" if check in failed else "waived", check.text)
     console.print(table)
-    failed = [check for check in found if not check.passed and not (check.waivable and check.name in waived)]
     if failed:
         names, (first, *_) = ", ".join(check.name for check in failed), failed
         other = f", or pass --waive {first.name} if you know why" if first.waivable else ""
@@ -144,15 +143,15 @@ def robot_sim(
     network: Network = "lo",
     domain: Domain = 0,
     scene: Scene = "free",
-    mass: Annotated[float | None, typer.Option(help="Object mass [kg] (default: random).", min=0.0)] = None,
-    seed: Annotated[int, typer.Option(min=0, max=2**32 - 1)] = 0,
+    mass: Annotated[float | None, Option(help="Object mass [kg] (default: random).", min=0.0)] = None,
+    seed: Annotated[int, Option(min=0, max=2**32 - 1)] = 0,
     support: Annotated[
         Literal["band", "fixture", "none"] | None,
-        typer.Option(help="Initial support of the robot (default: band; with an object: fixture)."),
+        Option(help="Initial support of the robot (default: band; with an object: fixture)."),
     ] = None,
-    release: Annotated[float, typer.Option(help="Time at full gains before the support releases [s].", min=0.0)] = 3.0,
+    release: Annotated[float, Option(help="Time at full gains before the support releases [s].", min=0.0)] = 3.0,
     object_pose: Annotated[
-        str | None, typer.Option(help="Send the object's pose to udp:PORT of this machine, as motion capture would.")
+        str | None, Option(help="Send the object's pose to udp:PORT of this machine, as motion capture would.")
     ] = None,
     lockstep: InStep = False,
     seconds: Seconds = float("inf"),

@@ -6,8 +6,8 @@ from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-import typer
 from rich.console import Console
+from typer import Exit, Option
 
 from iowbc.commands import options
 from iowbc.commands.compare import film_joint, write_comparison
@@ -45,7 +45,7 @@ def run(
     address: options.Address = None,
     on_code_change: options.OnCodeChange = "report",
     quiet: options.Quiet = False,
-    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Print one line per progress step.")] = False,
+    verbose: Annotated[bool, Option("--verbose", "-v", help="Print one line per progress step.")] = False,
     runs: options.RunsFolder = options.RUNS,
 ) -> None:
     """Run a recipe or a study; exits with the code of the run."""
@@ -53,7 +53,7 @@ def run(
     request = Request(recipe, overrides or (), Runs(runs), asked)
     manner: Manner = "quiet" if quiet else "verbose" if verbose else "usual"
     with ignoring_broken_outputs():
-        raise typer.Exit(run_request(request, stdout_console(), manner))
+        raise Exit(run_request(request, stdout_console(), manner))
 
 
 def run_request(request: Request, console: Console, manner: Manner) -> int:
@@ -179,8 +179,6 @@ def run_recipe(
 def _display(loaded: LoadedRecipe, console: Console, stopping: Callable[[], str], manner: Manner) -> Display:
     if manner == "quiet":
         return Display()
-    if manner == "verbose":
-        return PlainDisplay(0.0, console.file)
-    if console.is_terminal:
+    if manner == "usual" and console.is_terminal:
         return LiveTable(console, stopping)
-    return PlainDisplay(loaded.recipe.execution.line_interval, console.file)
+    return PlainDisplay(0.0 if manner == "verbose" else loaded.recipe.execution.line_interval, console.file)

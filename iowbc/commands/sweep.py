@@ -2,22 +2,24 @@
 
 import math
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
+import numpy as np
 from rich.console import Console
+from typer import Exit, Option
 
 from iowbc.commands import completion, options
-from iowbc.commands.lookup import SWEEP_TABLE, named, record_sweep
+from iowbc.commands.lookup import SWEEP_POINTS, SWEEP_TABLE, named, record_sweep
 from iowbc.commands.plan import in_all, plan_table, planned
 from iowbc.commands.points import Endings, PointProcess, PointRun, PointThread, run_points
 from iowbc.commands.printed import shown_path, stdout_console, tell
 from iowbc.commands.process import DONE, INTERRUPTED, STAGE_FAILED, RunEnding, ignoring_broken_outputs
-from iowbc.commands.request import Request, in_order, point_planners
+from iowbc.commands.request import Request, in_order, prepared
+from iowbc.commands.results import headline
 from iowbc.commands.run import requested_cluster, run_recipe
 from iowbc.errors import UsageError
 from iowbc.pipeline.console.board import Board
@@ -28,21 +30,25 @@ from iowbc.pipeline.store.runs import Runs, require_writable_runs
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.tracking.tracker import RunRecord, sweep_record
 from iowbc.processes import available_cores
-from iowbc.recipe.sweep import MOST_POINTS, Sweep
-from iowbc.results.table import drawn, markdown
+from iowbc.recipe.recipe import PIPELINE, SEEDS
+from iowbc.recipe.sweep import MOST_POINTS, Sweep, load_sweep, written
+from iowbc.report.runs import Run
+from iowbc.results.table import Cell, Table, drawn, heads, markdown, measured
 
 if TYPE_CHECKING:
     from iowbc.pipeline.cluster.cluster import Cluster
 
 LOGS = "logs"
 """Folder of a sweep with what each point prints."""
+OUTCOMES_SHOWN = 6
+"""Maximum number of metrics in the table of results; those of the last stages come first."""
 
 
 def sweep(
     recipe: options.RecipeFile,
     overrides: Annotated[
         list[str] | None,
-        typer.Option(
+        Option(
             "--set",
             help="Value to set, or values to vary (a,b or 0..4; repeat for a grid).",
             metavar="A.B.C=VALUES",
@@ -50,18 +56,18 @@ def sweep(
         ),
     ] = None,
     file: Annotated[
-        Path | None, typer.Option("--from", help="YAML file of a sweep: grid, random draws, or both.", metavar="YAML")
+        Path | None, Option("--from", help="YAML file of a sweep: grid, random draws, or both.", metavar="YAML")
     ] = None,
     jobs: Annotated[
         int | None,
-        typer.Option(help="Points run in parallel on shared cores (default: 1; with Ray: all cores).", min=1),
+        Option(help="Points run in parallel on shared cores (default: 1; with Ray: all cores).", min=1),
     ] = None,
-    points: Annotated[int, typer.Option(help="Maximum number of points.", min=1)] = MOST_POINTS,
+    points: Annotated[int, Option(help="Maximum number of points.", min=1)] = MOST_POINTS,
     until: options.Until = None,
-    workers: Annotated[int | None, typer.Option(help="Worker processes per point.", min=1)] = None,
+    workers: Annotated[int | None, Option(help="Worker processes per point.", min=1)] = None,
     engine: options.Engine = None,
     address: options.Address = None,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Show the plan without running it.")] = False,
+    dry_run: Annotated[bool, Option("--dry-run", help="Show the plan without running it.")] = False,
     on_code_change: options.OnCodeChange = "report",
     quiet: options.Quiet = False,
     runs: options.RunsFolder = options.RUNS,
@@ -73,13 +79,15 @@ def sweep(
     further += ["--points", str(points)] if points != MOST_POINTS else []
     request = Request(recipe, overrides or (), Runs(runs), settings, "sweep", further)
     console = stdout_console()
+    found = load_sweep(recipe, request.overrides, file, points)
+    planners = [prepared(point.loaded, request.runs, settings) for point in found.points]
     if dry_run:
-        found = planned(point_planners(request, file, points)[1])
-        console.print(plan_table(found, "point"))
-        console.print(in_all(found), highlight=False)
+        plans = planned(planners)
+        console.print(plan_table(plans, "point"))
+        console.print(in_all(plans), highlight=False)
         return
     with ignoring_broken_outputs():
-        raise typer.Exit(run_sweep(request, file, jobs, points, console, quiet))
+        raise Exit(run_sweep(request, found, planners, jobs, console, quiet))
 
 
 def _require_origins(asked: Request, planners: Sequence[Planner]) -> None:
@@ -94,10 +102,11 @@ def _require_origins(asked: Request, planners: Sequence[Planner]) -> None:
         raise UsageError(f"the points begin from what is not made yet; first\n  {lines}")
 
 
-def run_sweep(asked: Request, file: Path | None, jobs: int | None, most: int, console: Console, quiet: bool) -> int:
-    """Run all points, even if some fail; returns the exit code. Raises `RecipeError`, or `UsageError` if another recipe
-    has to run first. file, most: see `point_planners`; jobs: see `_shared_out`."""
-    found, planners = point_planners(asked, file, most)
+def run_sweep(
+    asked: Request, found: Sweep, planners: Sequence[Planner], jobs: int | None, console: Console, quiet: bool
+) -> int:
+    """Run all points, even if some fail; returns the exit code. Raises `UsageError` if another recipe has to run first.
+    planners: of the points; jobs: see `_shared_out`."""
     _require_origins(asked, planners)
     runs, execution = asked.runs, planners[0].loaded.recipe.execution
     options.require_extra("train", "iowbc sweep")
@@ -159,24 +168,85 @@ def _conclude(
     found: Sweep, endings: Endings, runs: Runs, folder: Path, console: Console, record: RunRecord | None
 ) -> None:
     """Write the results of the points that have finished, print them, and record them."""
-    from iowbc.commands.sweep_results import outcomes, table, write_results
+    import pandas as pd
 
     states = {name: ending.state for name, ending in endings.items()}
     finished = {name: named(Store(runs), name) for name, state in states.items() if state == "done"}
     if not finished:
         return
-    lines = outcomes(found, finished)
-    results = table(found, lines)
-    paths = write_results(found, lines, finished, states, folder)
+    results, means = results_of(found, finished)
+    paths = [folder / name for name in (SWEEP_TABLE, SWEEP_POINTS)]
+    paths[0].write_text(markdown(results), encoding="utf-8")
+    rows = []
+    for point in found.points:
+        rows.append({"point": point.name, "state": states.get(point.name, "waits"), **point.settings})
+        for stage, artifact in finished[point.name].artifacts.items() if point.name in finished else ():
+            rows[-1] |= {f"{stage}/{name}": value for name, value in artifact.metrics.items()}
+    pd.DataFrame(rows).to_csv(paths[1], index=False)
     if record is not None:
-        means = {f"{line.label}/{name}": mean for line in lines for name, (mean, _) in line.figures.items()}
-        figures = {name: mean for name, mean in means.items() if math.isfinite(mean)}
-        record.describe(markdown(results), figures, [folder / SWEEP_TABLE])
+        record.describe(markdown(results), means, [paths[0]])
     console.print(drawn(results, console.width))
     for path in paths:
         tell(console, shown_path(path))
     if len(finished) > 1:
         tell(console, f"next:\n  {shlex.join(['iowbc', 'compare', found.name, *runs.option])}")
+
+
+def results_of(sweep: Sweep, found: Mapping[str, Run]) -> tuple[Table, dict[str, float]]:
+    """A row for each setting: means over seeds with half their 95 % interval; and these means by setting and metric.
+    `found`: the finished points by name, at least one."""
+    settings = [path for path in sweep.axes if path not in SEEDS]
+    last_words = [path.rpartition(".")[2] for path in settings]
+    names = [word if last_words.count(word) == 1 else path for word, path in zip(last_words, settings, strict=True)]
+    finished = [point for point in sweep.points if point.name in found]
+    groups: dict[tuple[str, ...], list[Run]] = {}
+    for point in finished:
+        groups.setdefault(tuple(written(point.settings[path]) for path in settings), []).append(found[point.name])
+    metrics = _chosen([found[point.name] for point in finished])
+    rows, means = list[tuple[Cell, ...]](), dict[str, float]()
+    for values, runs in groups.items():
+        label = ", ".join(map(" ".join, zip(names, values, strict=True))) or sweep.name
+        figures = {f"{stage} {name}": _mean(runs, stage, name) for stage, name in metrics}
+        means |= {f"{label}/{name}": mean for name, (mean, _) in figures.items() if math.isfinite(mean)}
+        cells = [measured(mean, half, ".4g", ".2g", none="") for mean, half in figures.values()]
+        rows.append((*values, str(len(runs)), *cells))
+    columns = heads(*names, "seeds", *(f"{stage} {name}" for stage, name in metrics))
+    caption = f"Sweep {sweep.name}: means over seeds with their 95 % interval."
+    return Table(sweep.name, caption, columns, rows, grouped=False), means
+
+
+def _chosen(runs: Sequence[Run]) -> Sequence[tuple[str, str]]:
+    """Stage and name of the main metrics in which points differ, of many those of the last stages; if none differs,
+    those of the last stage."""
+    found = (
+        (stage, name)
+        for stage in reversed(PIPELINE)
+        for run in runs
+        if stage in run.artifacts
+        for name, _ in headline(stage, run.artifacts[stage].metrics)
+    )
+    known = list(dict.fromkeys(found))
+    differing = [metric for metric in known if len({_metric(run, *metric) for run in runs}) > 1]
+    last = [metric for metric in known if metric[0] == known[0][0]]
+    return (differing or last)[:OUTCOMES_SHOWN][::-1]
+
+
+def _mean(runs: Sequence[Run], stage: str, name: str) -> tuple[float, float]:
+    """Mean of a metric and half its interval, NaN where there is none; runs that share an artifact count as one
+    measurement."""
+    from iowbc.evaluation.report.statistics import mean_half_width
+
+    once = {run.artifacts[stage].manifest.key: _metric(run, stage, name) for run in runs if stage in run.artifacts}
+    values = np.array([value for value in once.values() if math.isfinite(value)], np.float64)
+    if not len(values):
+        return math.nan, math.nan
+    alike = len(values) > 1 and not np.ptp(values)
+    return float(values.mean()), 0.0 if alike else mean_half_width(values)
+
+
+def _metric(run: Run, stage: str, name: str) -> float:
+    """A metric of a run; NaN where it has none."""
+    return run.artifacts[stage].metrics.get(name, math.nan) if stage in run.artifacts else math.nan
 
 
 def _tell_rest(asked: Request, endings: Endings, folder: Path, code: int) -> None:

@@ -6,7 +6,7 @@ import subprocess
 import sys
 from typing import TYPE_CHECKING, Annotated
 
-import typer
+from typer import Exit, Option
 
 from iowbc.commands import options
 from iowbc.commands.printed import stdout_console, tell
@@ -26,7 +26,7 @@ VIEW = "iowbc"
 
 
 def ui(
-    port: Annotated[int, typer.Option(help="Local port.", min=1, max=65535)] = 5000,
+    port: Annotated[int, Option(help="Local port.", min=1, max=65535)] = 5000,
     folder: options.RunsFolder = options.RUNS,
 ) -> None:
     """Serve until interrupted; exits with the server's code. Raises `UsageError` where it cannot begin."""
@@ -54,7 +54,7 @@ def ui(
     environment.setdefault("PYTHONWARNINGS", "ignore")  # hides warnings about MLflow's own code
     with subprocess.Popen(command, env=environment) as server:
         try:
-            raise typer.Exit(server.wait())
+            raise Exit(server.wait())
         finally:
             server.terminate()
 

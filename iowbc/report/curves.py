@@ -22,6 +22,7 @@ Values = NDArray[np.float64]
 
 MOST_POINTS = 400
 """Points of a curve; a longer one is averaged over neighbours."""
+STEPS = "million environment steps"
 BAND = 0.2
 ERRORS = {"rate": "success rate", "E_v": "E_v [m/s]", "E_psi": "E_ψ [rad]", "E_alpha": "E_α [rad]", "E_h": "E_h [m]"}
 SWEPT = 2
@@ -70,22 +71,20 @@ class Curve:
 @dataclass
 class CurvePanel:
     title: str
+    over_mass: bool = False
+    """True over the mass, with marks and an upright axis that begins at 0, so that heights compare; else over steps."""
     curves: list[Curve] = field(default_factory=list)
-    across: str = "million environment steps"
-    mode: str = "lines"
-    """Mode of plotly for its curves."""
-    from_zero: bool = False
-    """True where the upright axis begins at 0, so that heights compare."""
 
     @property
     def figure(self) -> dict[str, Any]:
         """The figure for plotly, which takes markup in its texts; the page adds the colours of light and dark."""
         layout: dict[str, Any] = {
             "title": {"text": escape(self.title, quote=False), "font": {"size": 14}},
-            "xaxis": {"title": {"text": self.across}},
-            "yaxis": {"rangemode": "tozero"} if self.from_zero else {},
+            "xaxis": {"title": {"text": "mass [kg]" if self.over_mass else STEPS}},
+            "yaxis": {"rangemode": "tozero"} if self.over_mass else {},
         }
-        return {"data": [trace for curve in self.curves for trace in curve.traces(self.mode)], "layout": layout}
+        mode = "lines+markers" if self.over_mass else "lines"
+        return {"data": [trace for curve in self.curves for trace in curve.traces(mode)], "layout": layout}
 
 
 def learning_panels(
@@ -116,8 +115,8 @@ def evaluation_panels(groups: Sequence[Group]) -> list[CurvePanel]:
             for name, title in ERRORS.items():
                 curves = [suites[suite][name] for suites in found if suite in suites]
                 joined = _joined([curve[:2] for curve in curves]) if len(curves) > 1 else curves[0]
-                new = CurvePanel(f"{suite}: {title}", across="mass [kg]", mode="lines+markers", from_zero=True)
-                panels.setdefault((suite, name), new).curves.append(Curve(group.label, colour, *joined))
+                panel = panels.setdefault((suite, name), CurvePanel(f"{suite}: {title}", over_mass=True))
+                panel.curves.append(Curve(group.label, colour, *joined))
     return list(panels.values())
 
 
@@ -135,7 +134,7 @@ def learning_figure(panels: Sequence[CurvePanel], title: str) -> Figure:
                 edges = (one.across, one.low, one.high)
                 axes.fill_between(*edges, where=one.banded, color=one.colour, alpha=BAND, linewidth=0)
         axes.set_title(panel.title, fontsize=9)
-        axes.set_xlabel(panel.across, fontsize=8)
+        axes.set_xlabel(STEPS, fontsize=8)
         axes.tick_params(labelsize=8)
         axes.grid(alpha=0.3)
     figure.legend(labels.values(), labels.keys(), loc="outside lower center", ncols=5, fontsize=9, frameon=False)

@@ -1,4 +1,4 @@
-"""Comparison of runs, with those that differ only in their seed in one group."""
+"""Runs, with those that differ only in their seed in one group; tables of their metrics and of their trainings."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -11,7 +11,8 @@ from iowbc.pipeline.console.wording import figure
 from iowbc.pipeline.nested import flattened
 from iowbc.pipeline.store.artifact import Artifact
 from iowbc.recipe.recipe import SEEDS
-from iowbc.results.table import Cell, Column, MeanCell, Table, heads
+from iowbc.results.table import ABSENT, Cell, Column, MeanCell, Table, heads
+from iowbc.stages.registry import STAGES
 
 
 @dataclass(frozen=True)
@@ -79,23 +80,51 @@ def metrics_table(groups: Sequence[Group]) -> Table:
     for stage, metric in ((stage, metric) for stage, metrics in names.items() for metric in metrics):
         values = [group.values(stage, metric) for group in groups]
         if len(groups) == 1 or any(not np.array_equal(np.unique(own), np.unique(values[0])) for own in values[1:]):
-            rows.append((stage, metric, *_cells(values)))
+            row: list[Cell] = [stage, metric, _cell(values[0])]
+            for own in values[1:]:  # a difference is empty where either is unknown
+                known = len(own) and len(values[0])
+                row += [_cell(own), figure(own.mean() - values[0].mean(), 3, "+") if known else ""]
+            rows.append(tuple(row))
     others = [head for group in groups[1:] for head in (Column(group.label, role="detail"), f"Δ {group.label}")]
     return Table("metrics", "", heads("stage", "metric", groups[0].label, *others), rows, grouped=False)
-
-
-def _cells(values: Sequence[NDArray[np.float64]]) -> list[Cell]:
-    """A metric of the first group, then of each other one with its difference to the first; empty where unknown."""
-    cells = [_cell(values[0])]
-    for own in values[1:]:
-        known = len(own) and len(values[0])
-        cells += [_cell(own), figure(own.mean() - values[0].mean(), 3, "+") if known else ""]
-    return cells
 
 
 def _cell(values: NDArray[np.float64]) -> Cell:
     mean = figure(values.mean()) if len(values) else ""
     return MeanCell(mean, f"{np.ptp(values) / 2:.2g}") if len(values) > 1 else mean
+
+
+def trainings_table(groups: Sequence[Group], missing: Sequence[str] = ()) -> Table:
+    """Length and seed of each training behind a comparison, a row a run; `missing`: recipes that have not run."""
+    import pandas as pd
+
+    used = {stage for group in groups for run in group.runs for stage in run.recipe.get("stages", ())}
+    named = [STAGES[name] for name in STAGES if name in used | {"teacher", "distill"}]
+    methods = {stage.name: stage.trained_by for stage in named if stage.trained_by}
+    numbers = [
+        {"recipe": run.label, "algorithm": str(run.recipe["eval"]["label"]), "seed": seed}
+        | {stage: _steps_of(run, stage) for stage in methods}
+        for group in groups
+        for run, seed in zip(group.runs, group.seeds, strict=True)
+    ]
+    rows = [
+        tuple(ABSENT if n is None else f"{n:,}" if isinstance(n, int) else n for n in one.values()) for one in numbers
+    ]
+    rows += [(name, "not evaluated yet", *[ABSENT] * (1 + len(methods))) for name in missing]
+    columns = heads("Recipe", "Algorithm", "Seed", *(f"Steps of {method}" for method in methods.values()))
+    budget = "" if len({row["teacher"] for row in numbers}) == 1 else "not "
+    lacking = f" Missing: {', '.join(missing)}." if missing else ""
+    caption = f"What was trained, {budget}all with the same budget of PPO.{lacking}"
+    return Table("trainings", caption, columns, rows, pd.DataFrame(numbers))
+
+
+def _steps_of(run: Run, stage: str) -> int | None:
+    """Environment steps of a stage that trains; None where the run has no such stage."""
+    if stage not in run.recipe.get("stages", ()):
+        return None
+    made = run.artifacts[stage].recipe if stage in run.artifacts else run.recipe
+    (counted, *_) = STAGES[stage].counts or (f"{stage}.steps",)
+    return int(flattened(made)[counted])
 
 
 def _of_one_variant(first: Run, second: Run) -> bool:

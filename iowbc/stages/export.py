@@ -15,7 +15,6 @@ if TYPE_CHECKING:
 
 def run(job: Job) -> None:
     """Export, compare the graph with torch, and play the acceptance trials with the exported controller."""
-    from functools import partial
 
     import numpy as np
     import torch

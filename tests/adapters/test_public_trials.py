@@ -20,7 +20,7 @@ from typer.testing import CliRunner
 from iowbc.adapters.holosoma import adapter as holosoma_adapter
 from iowbc.adapters.source import load_adapter, policy_digest
 from iowbc.cli import app
-from iowbc.commands.bench_carry import SUITES, carry, suite_digest
+from iowbc.commands.bench import SUITES, carry, suite_digest
 from iowbc.control.references import ReferenceLayer
 from iowbc.evaluation.trials.plan import UNDISTURBED, command_script, planned_episode, planned_sweeps
 from iowbc.evaluation.trials.protocol import evaluated_policy, evaluated_world
@@ -153,14 +153,14 @@ def suites(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, Path]:
         lifting = SHORT["lifting"] | {"undisturbed": [], "with_share": [], "no_object": engine == "mujoco"}
         changes = SHORT | {"lifting": lifting, "scripts": None, "pushing": None}
         written.write_text(yaml.safe_dump({"extends": str(RECIPES / "public" / "carry.yaml"), "eval": changes}))
-    monkeypatch.setattr("iowbc.commands.bench_carry.SUITES", files)
+    monkeypatch.setattr("iowbc.commands.bench.SUITES", files)
     return files
 
 
 def test_the_bench_writes_a_page_with_the_digests_of_controller_adapter_and_suite(
     file: Path, suites: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("iowbc.commands.bench_carry.drake_version", lambda: "1.2.3")
+    monkeypatch.setattr("iowbc.commands.bench.drake_version", lambda: "1.2.3")
     adapter, page = tmp_path / "mine.py", tmp_path / "page.md"
     adapter.write_text("from iowbc.adapters.holosoma import adapter\n")
     carry(str(file), str(adapter), workers=1, out=page)
@@ -186,7 +186,7 @@ def test_every_trial_in_drake_is_one_of_the_bench() -> None:
 
 @pytest.mark.usefixtures("suites")
 def test_the_tutorial_plays_a_controller_of_ones_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("iowbc.commands.bench_carry.drake_version", lambda: None)
+    monkeypatch.setattr("iowbc.commands.bench.drake_version", lambda: None)
     monkeypatch.chdir(tmp_path)
     write("tutorials/controller.md", tmp_path)
     policy = linear(tmp_path / "walker.onnx", np.zeros((15, 55), np.float32), np.zeros(15, np.float32))
@@ -222,7 +222,7 @@ def test_the_digest_of_a_suite_changes_with_its_trials_alone() -> None:
 def test_the_bench_says_what_is_wrong_before_it_plays(
     words: list[str], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("iowbc.commands.bench_carry.drake_version", lambda: None)
+    monkeypatch.setattr("iowbc.commands.bench.drake_version", lambda: None)
     monkeypatch.chdir(tmp_path)
     done = CliRunner().invoke(app, ["bench", "carry", *words])
     assert message in str(done.exception)

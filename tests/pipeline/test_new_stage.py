@@ -6,7 +6,6 @@ from typing import Literal
 import pytest
 from workplace import Workplace
 
-from iowbc.commands.compare import trainings_table
 from iowbc.commands.playable import in_training, playable
 from iowbc.commands.results import headline, next_commands, policy_stages
 from iowbc.commands.ui import view
@@ -21,7 +20,7 @@ from iowbc.recipe.reading.loading import load_recipe
 from iowbc.recipe.recipe import PIPELINE, Recipe, StageName
 from iowbc.recipe.section import Section
 from iowbc.report.curves import learning_panels
-from iowbc.report.runs import Group, Run
+from iowbc.report.runs import Group, Run, trainings_table
 from iowbc.stages.registry import STAGES
 
 pytestmark = pytest.mark.unit
