@@ -19,17 +19,15 @@ from stable_baselines3.common.utils import set_random_seed
 from torch import Tensor
 
 from iowbc.arrays import Array
-from iowbc.learning.advantages import drawn_leaders, without_common_part
 from iowbc.learning.as_numpy import acting_policy
 from iowbc.learning.checkpoint import Arrays, module_arrays, restore_module
 from iowbc.learning.computing import ParallelBatch, reduced
 from iowbc.learning.gaussian import divergence, entropy, exploration, log_density
-from iowbc.learning.history_actor import student_architecture
-from iowbc.learning.networks import Mirrors, mirrors_as_json
+from iowbc.learning.networks import Mirrors, mirrors_as_json, student_architecture
 from iowbc.learning.normalization import Normalization
 from iowbc.learning.perceptron import Perceptron
 from iowbc.learning.policy import ActorCritic, acting_part
-from iowbc.learning.rollout import Samples
+from iowbc.learning.rollout import Samples, drawn_leaders, without_common_part
 from iowbc.recipe.skill.skill import SkillLearning
 from iowbc.recipe.teacher import Teacher
 from iowbc.rollouts.blocks import block_size
@@ -163,7 +161,7 @@ class Learner:
             own = without_common_part(columns["advantage"].cpu().numpy(), found.ended, settings.group)
             columns["advantage"].copy_(torch.from_numpy(own))
         self.gain = self._gain() if self.former else None
-        self.normalization.observe(self.policy.normalizer.newest(rows))
+        self.normalization.observe(rows[:, self.policy.newest])
 
     def _tensor(self, values: Array) -> Tensor:
         return torch.from_numpy(values).to(self.device)

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,14 +12,13 @@ from numpy.typing import NDArray
 from iowbc.errors import StageFailed
 from iowbc.learning import checkpoint
 from iowbc.learning.acting import Policy, policy_of
-from iowbc.learning.best import Best
 from iowbc.learning.checkpoint import Arrays, module_arrays, prefixed, under
 from iowbc.learning.environments import Environments
 from iowbc.learning.networks import Mirrors
 from iowbc.learning.policy import acting_part, load_policy_weights, trained_network
 from iowbc.learning.ppo import Learner
 from iowbc.learning.storage import Network
-from iowbc.recipe.teacher import Teacher
+from iowbc.recipe.teacher import Check, Teacher
 
 FLOOR_REACHED = 1.01
 """A standard deviation within this factor of its floor counts as at the floor."""
@@ -27,6 +27,57 @@ COLLAPSED_SHARE = 0.5
 
 Score = Callable[[Policy], Mapping[str, float]]
 """Evaluation of a policy: metrics that include `score`, higher is better."""
+
+
+@dataclass
+class Best:
+    """Best learner state so far, with rollback to it after a collapse."""
+
+    settings: Check
+    learner: Arrays
+    """At first the state before the first update."""
+    score: float = 0.0
+    caution: float = 1.0
+    """Factor of the desired KL divergence."""
+    rollbacks: int = 0
+    """Rollbacks since the last improvement."""
+    low: int = 0
+    """Number of consecutive scores far below the best."""
+
+    def collapsed(self, score: float) -> bool:
+        """True if this is the last of `patience` consecutive scores far below the best."""
+        far_below = self.score >= self.settings.notable and score < (1.0 - self.settings.collapse) * self.score
+        self.low = self.low + 1 if far_below else 0
+        return self.low >= self.settings.patience
+
+    def offer(self, score: float, learner: Arrays) -> None:
+        """Keep this learner state if its score equals or exceeds the best."""
+        if score >= self.score:
+            self.score, self.learner, self.rollbacks = score, learner, 0
+
+    def go_back(self, why: str) -> Arrays:
+        """Best learner state; also lowers `caution`. Raises StageFailed after too many rollbacks."""
+        self.rollbacks += 1
+        if self.rollbacks > self.settings.rollbacks:
+            raise StageFailed(
+                f"{why}, and all teacher.check.rollbacks ({self.settings.rollbacks}) are used up; lower "
+                "teacher.desired_kl or teacher.learning_rate, or raise it"
+            )
+        self.caution *= self.settings.caution
+        self.low = 0
+        return self.learner
+
+    def arrays(self) -> Arrays:
+        return {
+            **prefixed("learner", self.learner),
+            "score": np.array([self.score, self.caution]),
+            "rollbacks": np.array([self.rollbacks, self.low]),
+        }
+
+    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        self.learner = under("learner", arrays)
+        self.score, self.caution = arrays["score"].tolist()
+        self.rollbacks, self.low = arrays["rollbacks"].tolist()
 
 
 class TeacherTraining:

@@ -8,11 +8,11 @@ import torch
 from torch import Tensor
 
 from iowbc.arrays import Array, Indices, Keys
-from iowbc.learning.advantages import advantages
 from iowbc.learning.checkpoint import Arrays, prefixed, under
 from iowbc.learning.gaussian import divergence, entropy, log_density
 from iowbc.learning.policy import VALUE_GAIN
 from iowbc.learning.ppo import adapted, explained_variance
+from iowbc.learning.rollout import advantages
 from iowbc.recipe.skill.skill import SkillLearning
 from iowbc.skill.game import HUMAN, ROBOT, Observed, TransportGame
 from iowbc.skill.trained import Trained, mean_actions

@@ -54,7 +54,7 @@ def run(job: Job) -> None:
     from iowbc.control.action import action_mirror
     from iowbc.evaluation.films import TrainingFilms
     from iowbc.learning.computing import prepare_process
-    from iowbc.learning.history_environments import HistoryEnvironments
+    from iowbc.learning.environments import HistoryEnvironments
     from iowbc.learning.storage import save_network
     from iowbc.learning.teacher import TeacherTraining
     from iowbc.processes import available_cores

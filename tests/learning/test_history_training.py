@@ -13,7 +13,7 @@ from point_masses import SETTINGS as POINT_MASSES
 from iowbc.learning.acting import StudentPolicy, policy_of, unfinished_policy
 from iowbc.learning.as_numpy import student_policy
 from iowbc.learning.checkpoint import save_checkpoint
-from iowbc.learning.history_environments import HistoryEnvironments
+from iowbc.learning.environments import HistoryEnvironments
 from iowbc.learning.networks import StudentNetwork
 from iowbc.learning.teacher import TeacherTraining
 from iowbc.recipe.teacher import HistoryNetwork, Teacher
