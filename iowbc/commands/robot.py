@@ -165,8 +165,7 @@ def robot_sim(
     page = options.page_port(web, port)
     from iowbc.evaluation.exported import exported_world
     from iowbc.onboard.dds import DdsBus
-    from iowbc.twin.process import ObjectTracking, serve
-    from iowbc.twin.robot import Twin
+    from iowbc.twin.robot import ObjectTracking, Twin, serve
     from iowbc.twin.support import Support
 
     console = stdout_console()

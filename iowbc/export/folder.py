@@ -8,8 +8,7 @@ from typing import Any
 
 from iowbc.control.command import COMMAND
 from iowbc.deploy import contract, exported_folder
-from iowbc.export.graph import ControllerGraph
-from iowbc.export.onnx_graph import write_onnx
+from iowbc.export.graph import ControllerGraph, write_onnx
 from iowbc.recipe.evaluation.evaluation import Evaluation
 from iowbc.recipe.generator import ReferenceGenerator
 from iowbc.recipe.recipe import Recipe
@@ -50,7 +49,7 @@ def write_folder(
         **arrays,
         action_scale=tuple(graph.equations.scale.tolist()),
         action_bound=graph.equations.bound,
-        history=graph.history,
+        history=graph.student.history,
         observation=tuple(contract.PartEntry.model_validate(part) for part in graph.layout.describe()),
         command=COMMAND,
         commands=recipe.task.commands,

@@ -5,7 +5,6 @@ from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
-from torch import Tensor
 
 from iowbc.arrays import Array
 from iowbc.control.command import COMMAND
@@ -14,32 +13,16 @@ from iowbc.deploy.controller import open_session, run
 from iowbc.deploy.skill import CONTRACT, FILES, GOLDEN, GRAPH, SkillContract
 from iowbc.export.folder import PACKAGES
 from iowbc.export.golden import largest_difference, write_golden
-from iowbc.export.graph import Program, port_entry
-from iowbc.export.onnx_graph import run_torch, write_onnx
+from iowbc.export.graph import Program, port_entry, run_torch, write_onnx
 from iowbc.learning.networks import TeacherNetwork
 from iowbc.recipe.recipe import Recipe
-
-
-class SkillProgram(Program):
-    """`skill.onnx`: the mean action of the robot's policy."""
-
-    def __init__(self, network: TeacherNetwork) -> None:
-        super().__init__()
-        self.network, size = network, len(network.normalizer.mean)
-        self.inputs = (port_entry("observation", (size,), "SI", "heading", "see iowbc.control.skill_observation"),)
-        meaning = "departure of C from the nominal command, in parts of its scales"
-        self.outputs = (port_entry("action", (len(COMMAND),), "1", "heading", meaning),)
-        self.eval().requires_grad_(False)
-
-    def forward(self, *values: Tensor) -> tuple[Tensor, ...]:
-        return (self.network(values[0]).clamp(-1.0, 1.0),)
 
 
 def write_skill(
     out: Path, network: TeacherNetwork, recipe: Recipe, sources: Mapping[str, str], observations: Array
 ) -> float:
-    """Write the skill; returns the largest difference between torch and onnxruntime over the observations (n, size).
-    sources: artifact keys of the skill's inputs, by stage."""
+    """Write the skill, whose graph is the mean action of the robot's policy; returns the largest difference between
+    torch and onnxruntime over the observations (n, size). sources: artifact keys of the skill's inputs, by stage."""
     contract = SkillContract(
         frequency=recipe.skill.frequency,
         observation=observations.shape[1],
@@ -49,7 +32,13 @@ def write_skill(
         sources=dict(sources),
         versions={name: version(name) for name in PACKAGES},
     )
-    program = SkillProgram(network)
+    meaning = "departure of C from the nominal command, in parts of its scales"
+    program = Program(
+        lambda observation: (network(observation).clamp(-1.0, 1.0),),
+        (port_entry("observation", (contract.observation,), "SI", "heading", "see iowbc.control.skill_observation"),),
+        (port_entry("action", (len(COMMAND),), "1", "heading", meaning),),
+        network,
+    )
     about = {"contract": contract.model_dump_json(exclude={"files"}), **sources}
     write_onnx(program, out / GRAPH, recipe.export.opset, about)
     inputs = {"observation": np.ascontiguousarray(observations, np.float32)}

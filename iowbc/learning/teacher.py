@@ -146,7 +146,7 @@ class TeacherTraining:
         elif float(deviation.mean()) <= FLOOR_REACHED * floor < COLLAPSED_SHARE * self.settings.std_end:
             why = "exploration died out"
         elif self.score is not None and updates % (self.settings.check.every or 1) == 0:
-            found = {f"check/{name}": float(value) for name, value in self.score(policy_of(*self.network())).items()}
+            found = {f"check/{name}": float(value) for name, value in self.score(policy_of(self.network()[0])).items()}
             figures |= found
             if self.best.collapsed(found["check/score"]):
                 why = f"the score fell from {self.best.score:.3f} to {found['check/score']:.3f}"
@@ -162,7 +162,7 @@ class TeacherTraining:
     def keep_best(self) -> None:
         """End the training: score the last policy, then restore the best learner state."""
         if self.score is not None:
-            self.best.offer(float(self.score(policy_of(*self.network()))["score"]), self._scored())
+            self.best.offer(float(self.score(policy_of(self.network()[0]))["score"]), self._scored())
             self._restore_learner(self.best.learner)
 
     def _learner_state(self) -> Arrays:

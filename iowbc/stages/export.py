@@ -38,7 +38,7 @@ def run(job: Job) -> None:
     try:
         world = Specification(job.recipe, job.robot, rg).deployed
         policy, played = run_acceptance(world, job.out, job.interrupted)
-        by_torch = try_out_network(world, policy_of(student, about["architecture"]), job.interrupted)
+        by_torch = try_out_network(world, policy_of(student), job.interrupted)
         steps = golden_inputs(world, job.out, job.interrupted)
     except Interrupted as stopped:
         raise Interrupted(f"export: {stopped}; it starts anew, which takes less than a minute") from stopped
@@ -81,9 +81,9 @@ def _graph(job: Job, student: "StudentNetwork", about: Mapping[str, Any]) -> "Co
     robot, task = load_robot(job.robot), job.recipe.task
     sees_object = OBJECT[0].name in {part["name"] for part in about["layout"]["observation"]}
     references = ReferenceLayer(robot, task.references, job.inputs.get("rg-fit"))
-    layout, history = observation_layout(robot, sees_object), int(about["architecture"]["history"])
+    layout = observation_layout(robot, sees_object)
     require_layout(job.inputs[policy_stage(job.recipe)], about, {"observation": layout.describe()})
-    return ControllerGraph(student, robot, task, layout, history, references)
+    return ControllerGraph(student, robot, task, layout, references)
 
 
 def _parity(graph: "ControllerGraph", inputs: "Values", out: Path) -> dict[str, float]:
@@ -93,7 +93,7 @@ def _parity(graph: "ControllerGraph", inputs: "Values", out: Path) -> dict[str, 
     from iowbc.deploy import exported_folder
     from iowbc.deploy.controller import open_session, run
     from iowbc.export import golden
-    from iowbc.export.onnx_graph import run_torch
+    from iowbc.export.graph import run_torch
 
     expected = golden.played(partial(run_torch, graph.settle), partial(run_torch, graph.step), inputs)
     settle, step = (partial(run, open_session(out / name)) for name in (exported_folder.SETTLE, exported_folder.STEP))

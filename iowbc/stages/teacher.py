@@ -147,7 +147,7 @@ def _film(job: Job, training: "TeacherTraining", films: "TrainingFilms") -> None
     from iowbc.learning.acting import policy_of
 
     path = films.due(training.steps, training.planned)
-    if path is not None and films.make(path, policy_of(*training.network()), job.report.say):
+    if path is not None and films.make(path, policy_of(training.network()[0]), job.report.say):
         job.report.files(path.parent)
 
 

@@ -57,7 +57,7 @@ def driven(recipe: Recipe, robot: Robot, rg: Path, graph: ControllerGraph, expor
     )
     environment = VectorEnv(Specification(recipe, robot.folder, rg), num_envs=3, workers=0, seed=0, episodes=episodes)
     controller = Controller.load(exported, robots=3)
-    both = Both(ExportedPolicy(controller, environment, golden_steps=80), StudentPolicy(graph.student, graph.history))
+    both = Both(ExportedPolicy(controller, environment, golden_steps=80), StudentPolicy(graph.student))
     try:
         play_in(environment, both)
     finally:

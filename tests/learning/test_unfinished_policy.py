@@ -25,7 +25,7 @@ def test_the_newest_whole_checkpoint_acts_as_the_training_does(tmp_path: Path, s
     for _ in range(2):
         training.update()
         save_checkpoint(path, KEY, training.arrays())
-        acting.append(policy_of(*training.network()))
+        acting.append(policy_of(training.network()[0]))
     seen = np.random.default_rng(0).normal(size=(5, MIRRORS[0].sign.size)).astype(np.float32)
     none = np.zeros((5, 0), np.float32)
 

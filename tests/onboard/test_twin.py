@@ -20,8 +20,7 @@ from iowbc.onboard.operators import Udp
 from iowbc.onboard.process import PERIOD
 from iowbc.onboard.ranges import Ranges
 from iowbc.sim.rendering.forces import Force
-from iowbc.twin.process import ObjectTracking
-from iowbc.twin.robot import SILENCE, Twin
+from iowbc.twin.robot import SILENCE, ObjectTracking, Twin
 from iowbc.twin.support import Support
 
 pytestmark = pytest.mark.integration

@@ -21,9 +21,9 @@ from iowbc.learning.networks import TeacherNetwork
 from iowbc.recipe.reading.loading import load_recipe
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import robot_folder
+from iowbc.skill.episodes import Plan
 from iowbc.skill.game import TransportGame
 from iowbc.skill.lower_layer import load_student
-from iowbc.skill.plan import Plan
 from iowbc.task.specification import Specification
 
 ROOT = Path(__file__).parents[2]
