@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from stable_baselines3.common.policies import ActorCriticPolicy
 from torch import Tensor, nn
 
-from iowbc.learning.checkpoint import Arrays
+from iowbc.learning.checkpoint import Arrays, under
 from iowbc.learning.gaussian import log_density, std_places
 from iowbc.learning.networks import (
     Mirrors,
@@ -167,12 +167,7 @@ class ActorCritic(ActorCriticPolicy):  # type: ignore[misc]
         return self.log_stds[self.std_place]
 
     def finite(self) -> bool:
-        """True if every parameter is finite."""
         return all(bool(torch.isfinite(parameter).all()) for parameter in self.parameters())
-
-    def prepared(self, observations: Tensor) -> Tensor:
-        """Observations, (n, S), as inputs of both networks in training: normalised, in their mirror basis."""
-        return self.actor.prepare(self.normalizer(observations))
 
     def forward(self, obs: Tensor, deterministic: bool = False) -> tuple[Tensor, Tensor, Tensor]:
         mean, log_std = self._mean(obs), self.log_std
@@ -218,12 +213,12 @@ def trained_network(
                 "mirrors": mirrors_as_json(mirrors, settings.symmetry),
             }
             network = TeacherNetwork(**architecture)
-            network.body.load_state_dict(_part("actor.", arrays))
+            network.body.load_state_dict(under("actor", arrays, "."))
         else:
             seen = len(arrays["actor.network.normalizer.mean"])
             architecture = student_architecture(settings, seen, actions, mirrors)
             network = StudentNetwork(**architecture)
-            network.load_state_dict(_part("actor.network.", arrays))
+            network.load_state_dict(under("actor.network", arrays, "."))
             mean, std = mean[:seen], std[:seen]
     network.normalizer.mean.copy_(mean)
     network.normalizer.std.copy_(std)
@@ -242,7 +237,3 @@ def load_policy_weights(policy: ActorCritic, network: Network) -> None:
     policy.hide()
     with torch.no_grad():
         policy.log_stds[policy.std_place] = network.log_std.to(policy.log_stds.device)
-
-
-def _part(beginning: str, arrays: Mapping[str, Tensor]) -> dict[str, Tensor]:
-    return {name.removeprefix(beginning): value for name, value in arrays.items() if name.startswith(beginning)}

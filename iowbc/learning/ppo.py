@@ -167,8 +167,9 @@ class Learner:
         return torch.from_numpy(values).to(self.device)
 
     def _prepare(self, rows: Tensor) -> Tensor:
+        """Rows, (n, S), as inputs of both networks: normalised, in their mirror basis."""
         with torch.inference_mode():
-            return self.policy.prepared(rows)
+            return self.policy.actor.prepare(self.policy.normalizer(rows))
 
     def _judge(self, samples: Tensor) -> None:
         """Write the policy's mean, the log density of the action and the value into rows of samples."""

@@ -11,8 +11,7 @@ from iowbc.control.skill_command import SkillCommand
 from iowbc.recipe.skill.skill import PathFollowing, Skill
 from iowbc.recipe.task.commands import Commands
 from iowbc.robot.rotations import turned, wrapped
-from iowbc.skill.path import Paths
-from iowbc.skill.situation import GameState
+from iowbc.skill.situation import GameState, Paths
 
 
 @dataclass(frozen=True)

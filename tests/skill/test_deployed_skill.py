@@ -16,7 +16,7 @@ from iowbc.deploy.exported_folder import exported_folder
 from iowbc.deploy.skill import CONTRACT, GOLDEN, GRAPH, Skill
 from iowbc.deploy.timing import step_seconds
 from iowbc.errors import ContractBroken
-from iowbc.export.skill import write_skill
+from iowbc.export.folder import write_skill
 from iowbc.learning.networks import TeacherNetwork
 from iowbc.recipe.reading.loading import load_recipe
 from iowbc.recipe.recipe import Recipe
