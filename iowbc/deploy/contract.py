@@ -197,16 +197,12 @@ def meanings(section: type[Section], path: str = "") -> dict[str, str]:
     return found
 
 
-def seal(contract: Contract, folder: Path) -> Contract:
-    """Write `contract.json` with the digest of every file now in the folder."""
-    files = sorted(path for path in folder.rglob("*") if path.is_file() and path != folder / CONTRACT)
-    return write_sealed(contract, folder / CONTRACT, [str(path.relative_to(folder)) for path in files])
-
-
-def write_sealed(contract: Kind, path: Path, files: Iterable[str]) -> Kind:
-    """Write a contract to a file, with the digests of other files of its folder."""
-    sealed = contract.model_copy(update={"files": {name: file_digest(path.parent / name) for name in files}})
-    path.write_text(sealed.model_dump_json(indent=1) + "\n", encoding="utf-8")
+def seal(contract: Kind, folder: Path, name: str = CONTRACT, files: Iterable[str] = ()) -> Kind:
+    """Write a contract as a file with the digests of these other files of its folder, by default all that are there."""
+    every = sorted(path for path in folder.rglob("*") if path.is_file() and path != folder / name)
+    sealed_files = files or [str(path.relative_to(folder)) for path in every]
+    sealed = contract.model_copy(update={"files": {file: file_digest(folder / file) for file in sealed_files}})
+    (folder / name).write_text(sealed.model_dump_json(indent=1) + "\n", encoding="utf-8")
     return sealed
 
 

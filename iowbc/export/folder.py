@@ -117,5 +117,5 @@ def write_skill(
     inputs = {"observation": np.ascontiguousarray(observations, np.float32)}
     expected = run_torch(program, inputs)
     write_golden(inputs, expected, out / GOLDEN)
-    contract.write_sealed(statement, out / CONTRACT, FILES)
+    contract.seal(statement, out, CONTRACT, FILES)
     return max(largest_difference(expected, run(open_session(out / GRAPH), inputs)).values())

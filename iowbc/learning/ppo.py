@@ -22,6 +22,7 @@ from iowbc.arrays import Array
 from iowbc.learning.as_numpy import acting_policy
 from iowbc.learning.checkpoint import Arrays, module_arrays, restore_module
 from iowbc.learning.computing import ParallelBatch, reduced
+from iowbc.learning.environments import Environments
 from iowbc.learning.gaussian import divergence, entropy, exploration, log_density
 from iowbc.learning.networks import Mirrors, mirrors_as_json, student_architecture
 from iowbc.learning.normalization import Normalization
@@ -45,17 +46,18 @@ class Learner:
     def __init__(
         self,
         teacher: Teacher,
-        env: Any,
-        seed: int,
+        env: Environments,
         mirrors: Mirrors,
-        cores: int,
+        seed: int,
+        *,
+        cores: int = 1,
         value_only: Sequence[int] = (),
         device: str = "cpu",
     ) -> None:
-        """`mirrors`: of observation and action; `cores`: for network updates; `value_only`: indices of observations
-        for the value network only; `device`: torch device of the networks."""
+        """`mirrors`: of observation and action; `cores`: for network updates, while the environments are idle;
+        `value_only`: indices of observations for the value network only; `device`: torch device of the networks."""
         set_random_seed(seed)
-        self.settings, self.env, self.device = teacher, env, torch.device(device)
+        self.settings, self.env, self.mirrors, self.device = teacher, env, mirrors, torch.device(device)
         self._on_cpu = self.device.type == "cpu"
         self.in_parallel = ParallelBatch(teacher.parts if self._on_cpu else 1, cores)
         self._arguments = _policy_arguments(teacher, env, mirrors, value_only)

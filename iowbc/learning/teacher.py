@@ -1,7 +1,7 @@
 """Teacher training by PPO (paper III-C)."""
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,12 +13,10 @@ from iowbc.errors import StageFailed
 from iowbc.learning import checkpoint
 from iowbc.learning.acting import Policy, policy_of
 from iowbc.learning.checkpoint import Arrays, module_arrays, prefixed, under
-from iowbc.learning.environments import Environments
-from iowbc.learning.networks import Mirrors
 from iowbc.learning.policy import acting_part, load_policy_weights, trained_network
 from iowbc.learning.ppo import Learner
 from iowbc.learning.storage import Network
-from iowbc.recipe.teacher import Check, Teacher
+from iowbc.recipe.teacher import Check
 
 FLOOR_REACHED = 1.01
 """A standard deviation within this factor of its floor counts as at the floor."""
@@ -83,34 +81,19 @@ class Best:
 class TeacherTraining:
     """PPO with privileged information. Between two updates, `arrays` is its complete state."""
 
-    def __init__(
-        self,
-        settings: Teacher,
-        environments: Environments,
-        mirrors: Mirrors,
-        seed: int,
-        *,
-        cores: int = 1,
-        value_only: Sequence[int] = (),
-        device: str = "cpu",
-        score: Score | None = None,
-        say: Callable[[str], None] = print,
-    ) -> None:
-        """`mirrors`: of observation and action; `cores`: for network updates, while the environments are idle;
-        `value_only`: indices of observations for the value network only; `device`: torch device of the networks;
-        `score`: fixed evaluation that selects the best policy; `say`: receives a message at each rollback."""
-        self.settings, self.environments, self.mirrors = settings, environments, mirrors
-        self.planned = settings.steps
+    def __init__(self, model: Learner, score: Score | None = None, say: Callable[[str], None] = print) -> None:
+        """`score`: fixed evaluation that selects the best policy; `say`: receives a message at each rollback."""
+        self.model, self.settings, self.environments = model, model.settings, model.env
+        self.planned = self.settings.steps
         """Environment steps of the whole training; the last update may exceed them."""
-        self.score = score if settings.check.every is not None else None
+        self.score = score if self.settings.check.every is not None else None
         self.say = say
-        self._steps_an_update = settings.environments * settings.rollout
-        self.model = Learner(settings, environments, seed, mirrors, cores, value_only, device)
+        self._steps_an_update = self.settings.environments * self.settings.rollout
         self.average: Arrays = {}
         """Exponentially weighted mean of the policies' acting parts; empty unless the recipe wants one."""
-        if settings.average_half_life is not None:
+        if self.settings.average_half_life is not None:
             self.average = acting_part(module_arrays(self.model.policy))
-        self.best = Best(settings.check, self._learner_state())
+        self.best = Best(self.settings.check, self._learner_state())
 
     @property
     def steps(self) -> int:
@@ -241,4 +224,4 @@ class TeacherTraining:
 
     def network(self) -> tuple[Network, dict[str, Any]]:
         """The deterministic policy with its normalisation, and the arguments that rebuild it."""
-        return trained_network(self._acting(), self.settings, self.mirrors)
+        return trained_network(self._acting(), self.settings, self.model.mirrors)

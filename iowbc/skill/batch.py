@@ -14,10 +14,9 @@ from iowbc.rollouts.blocks import block_size
 from iowbc.sim.shapes import measured as shape_of
 from iowbc.skill import observation as seen
 from iowbc.skill.episodes import CLOCK, KINDS, PERSON, RULES, EpisodeDraws
-from iowbc.skill.figures import FIGURES, EpisodeFigures, internal_force
 from iowbc.skill.intentions import Human, NominalCommand, ObjectMotion, open_loop_motion, pursue
 from iowbc.skill.lower_layer import LowerLayer
-from iowbc.skill.reward import GameEnding, ending, potential, reward
+from iowbc.skill.outcomes import FIGURES, EpisodeFigures, GameEnding, ending, internal_force, potential, reward
 from iowbc.skill.situation import GameState, Origin, Paths, situation
 from iowbc.task.episodes import Episode
 from iowbc.task.vector.shared import Buffers

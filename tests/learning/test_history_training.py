@@ -15,6 +15,7 @@ from iowbc.learning.as_numpy import student_policy
 from iowbc.learning.checkpoint import save_checkpoint
 from iowbc.learning.environments import HistoryEnvironments
 from iowbc.learning.networks import StudentNetwork
+from iowbc.learning.ppo import Learner
 from iowbc.learning.teacher import TeacherTraining
 from iowbc.recipe.teacher import HistoryNetwork, Teacher
 from iowbc.robot.mirror import MirrorMap
@@ -30,7 +31,7 @@ SETTINGS = POINT_MASSES.model_copy(update={"steps": 16 * 8 * 60, "history": NETW
 
 def training(**changes: Any) -> TeacherTraining:
     environments = HistoryEnvironments(PointMasses(), SEEN, LENGTH)
-    return TeacherTraining(SETTINGS.model_copy(update=changes), environments, MIRRORS, seed=3)
+    return TeacherTraining(Learner(SETTINGS.model_copy(update=changes), environments, MIRRORS, seed=3))
 
 
 def test_the_history_ends_with_the_newest_observation_and_an_episode_with_its_own() -> None:

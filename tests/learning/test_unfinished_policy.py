@@ -9,6 +9,7 @@ from point_masses import MIRRORS, PointMasses
 from iowbc.errors import Damaged
 from iowbc.learning.acting import policy_of, unfinished_policy
 from iowbc.learning.checkpoint import save_checkpoint
+from iowbc.learning.ppo import Learner
 from iowbc.learning.teacher import TeacherTraining
 from iowbc.recipe.teacher import Teacher
 
@@ -20,7 +21,10 @@ def test_the_newest_whole_checkpoint_acts_as_the_training_does(tmp_path: Path, s
     settings = Teacher.model_validate(
         {"steps": 512, "environments": 8, "rollout": 16, "minibatches": 2, "hidden": [16], "symmetry": symmetry}
     )
-    training, path = TeacherTraining(settings, PointMasses(), MIRRORS, seed=3), tmp_path / "training.checkpoint"
+    training, path = (
+        TeacherTraining(Learner(settings, PointMasses(), MIRRORS, seed=3)),
+        tmp_path / "training.checkpoint",
+    )
     acting = []
     for _ in range(2):
         training.update()
