@@ -7,7 +7,8 @@ the gains of each command.
 import json
 import socket
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -189,25 +190,22 @@ def low_state(tick: int, seen: Measured, torque: Array) -> Record:
     return message
 
 
-class ObjectTracking:
-    """Simulated motion capture: sends the object's pose to a local port, for `iowbc robot --object-pose`."""
+@contextmanager
+def object_tracking(port: int) -> Iterator[Callable[[Twin], None]]:
+    """Simulated motion capture, for `iowbc robot --object-pose`: a function, to be called after every period, that sends
+    the measured pose of the object, with the recipe's noise and latency, to a local port. Raises UsageError for port 0,
+    which is valid only for a listener."""
+    if port == 0:
+        raise UsageError("--object-pose udp:0: nothing can be sent there; give the port of `iowbc robot`")
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
 
-    def __init__(self, port: int) -> None:
-        """Raises UsageError for port 0, which is valid only for a listener."""
-        if port == 0:
-            raise UsageError("--object-pose udp:0: nothing can be sent there; give the port of `iowbc robot`")
-        self._address = ("127.0.0.1", port)
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        def send(twin: Twin) -> None:
+            if twin.periods % POSE_PERIODS == 0:
+                measured = twin.simulation.measured
+                seen = {name: getattr(measured, name)[0].tolist() for name in quantities(of_object=True)}
+                sender.sendto(json.dumps({"seen": seen}).encode(), ("127.0.0.1", port))
 
-    def send(self, twin: Twin) -> None:
-        """Sends the measured pose, with the recipe's noise and latency; call it after every period."""
-        if twin.periods % POSE_PERIODS == 0:
-            measured = twin.simulation.measured
-            seen = {name: getattr(measured, name)[0].tolist() for name in quantities(of_object=True)}
-            self._socket.sendto(json.dumps({"seen": seen}).encode(), self._address)
-
-    def close(self) -> None:
-        self._socket.close()
+        yield send
 
 
 def serve(
