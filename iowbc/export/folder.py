@@ -19,6 +19,7 @@ from iowbc.learning.networks import TeacherNetwork
 from iowbc.recipe.evaluation.evaluation import Evaluation
 from iowbc.recipe.generator import ReferenceGenerator
 from iowbc.recipe.recipe import Recipe
+from iowbc.recipe.section import Section, sentences
 from iowbc.robot.description import DESCRIPTION
 
 PACKAGES = ("iowbc", "mujoco", "numpy", "onnx", "onnxruntime", "onnxscript", "torch")
@@ -67,13 +68,42 @@ def write_folder(
             sensors=(drawn.sensor_latency.low, drawn.sensor_latency.high),
             object=(drawn.object_latency.low, drawn.object_latency.high),
         ),
-        sentences=contract.meanings(contract.Contract),
+        sentences=meanings(contract.Contract),
         versions={name: version(name) for name in PACKAGES},
         sources=dict(sources),
     )
     for name, program in ((exported_folder.SETTLE, graph.settle), (exported_folder.STEP, graph.step)):
-        write_onnx(program, out / name, recipe.export.opset, contract.metadata(statement))
+        write_onnx(program, out / name, recipe.export.opset, metadata(statement))
     return contract.seal(statement, out)
+
+
+def metadata(statement: contract.Contract) -> dict[str, str]:
+    """Metadata of both ONNX files: the contract without file digests, and main entries by other exporters' names."""
+
+    def listed(values: tuple[float, ...]) -> str:
+        return ",".join(f"{value:g}" for value in values)
+
+    return {
+        "recipe": statement.recipe,
+        **statement.sources,
+        "joint_names": ",".join(statement.joints),
+        "joint_stiffness": listed(statement.kp),
+        "joint_damping": listed(statement.kd),
+        "default_joint_pos": listed(statement.default_position),
+        "action_scale": listed(statement.action_scale),
+        "command_names": ",".join(statement.command),
+        "observation_names": ",".join(part.name for part in statement.observation),
+        "contract": statement.model_dump_json(exclude={"files"}),
+    }
+
+
+def meanings(section: type[Section], path: str = "") -> dict[str, str]:
+    """Attribute docstring of each field of a section, and of its subsections, by dotted path."""
+    found = {f"{path}{name}": sentence.replace("\n", " ") for name, sentence in sentences(section).items()}
+    for name, about in section.model_fields.items():
+        if isinstance(about.annotation, type) and issubclass(about.annotation, Section):
+            found |= meanings(about.annotation, f"{path}{name}.")
+    return found
 
 
 def world_of(recipe: Recipe) -> Recipe:

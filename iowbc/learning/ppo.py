@@ -28,7 +28,7 @@ from iowbc.learning.networks import Mirrors, mirrors_as_json, student_architectu
 from iowbc.learning.normalization import Normalization
 from iowbc.learning.perceptron import Perceptron
 from iowbc.learning.policy import ActorCritic, acting_part
-from iowbc.learning.rollout import Samples, drawn_leaders, without_common_part
+from iowbc.learning.rollout import Samples, advantages, drawn_leaders, without_common_part
 from iowbc.recipe.skill.skill import SkillLearning
 from iowbc.recipe.teacher import Teacher
 from iowbc.rollouts.blocks import block_size
@@ -85,8 +85,6 @@ class Learner:
         the update has not seen, while -`policy_loss` is one from those that it has."""
         self.seconds = dict.fromkeys(("simulation", "inference", "learning"), 0.0)
         """Time per part since the last reset [s]."""
-        self.caution = 1.0
-        """Factor of the desired KL divergence."""
         self.value_alone = 0
         """Environment steps up to which only the value network learns: the policy's rate is zero, not its moments."""
 
@@ -120,7 +118,10 @@ class Learner:
 
     def collect(self) -> None:
         """Collect one rollout into the samples. Its observations are normalised by statistics of earlier rollouts."""
-        policy, env, settings = self.policy, self.env, self.settings
+        policy, env, settings, restart = self.policy, self.env, self.settings, self.settings.restart
+        if restart is not None and self.steps - settings.rollout * env.num_envs < restart.after <= self.steps:
+            with torch.no_grad():  # once, at the first rollout after the recipe's restart step
+                policy.log_stds.fill_(float(np.log(restart.std)))
         if self.observation is None:
             self.observation = env.reset()
         if settings.group > 1:
@@ -157,11 +158,14 @@ class Learner:
             values = self.policy.predict_values(self._tensor(behind))[:, 0].cpu().numpy()
         cut_steps, environments = found.cut.T
         rewards[cut_steps, environments] += settings.gamma * values[shape[1] :]
-        samples.finish(rewards, found.ended, values[: shape[1]], settings.gamma, settings.gae_lambda)
+        value = columns["value"].cpu().numpy()
+        last = values[: shape[1]]
+        advantage = advantages(rewards, found.ended, value, last, settings.gamma, settings.gae_lambda)
+        columns["target"].copy_(torch.from_numpy(advantage + value))
         self.explained = explained_variance(columns["value"], columns["target"])
         if settings.group > 1:
-            own = without_common_part(columns["advantage"].cpu().numpy(), found.ended, settings.group)
-            columns["advantage"].copy_(torch.from_numpy(own))
+            advantage = without_common_part(advantage, found.ended, settings.group)
+        columns["advantage"].copy_(torch.from_numpy(advantage))
         self.gain = self._gain() if self.former else None
         self.normalization.observe(rows[:, self.policy.newest])
 
@@ -201,15 +205,8 @@ class Learner:
             hidden = actor.hidden(samples["observation"])
         return actor.head(hidden)
 
-    def restart_exploration(self) -> None:
-        """Reset the standard deviation once, before the first update after the recipe's restart step."""
-        restart, passed = self.settings.restart, self.steps - self.settings.rollout * self.env.num_envs
-        if restart is not None and passed < restart.after <= self.steps:
-            with torch.no_grad():
-                self.policy.log_stds.fill_(float(np.log(restart.std)))
-
-    def train(self) -> dict[str, float]:
-        """Gradient steps on the samples; returns their statistics."""
+    def train(self, caution: float) -> dict[str, float]:
+        """Gradient steps on the samples; returns their statistics. `caution`: factor of the desired KL divergence."""
         settings, optimizer, begin = self.settings, self.policy.optimizer, time.perf_counter()
         rate = self.learning_rate if self._policy_learns else settings.learning_rate
         moved = float(self._policy_learns)
@@ -230,7 +227,7 @@ class Learner:
         values |= {} if self.gain is None else {"gain": self.gain}
         values |= {"std": float(torch.exp(self.policy.log_std.detach()).mean()), "learning_rate": rate}
         if self._policy_learns:
-            self.learning_rate = adapted(rate, last["kl"], settings, self.caution)
+            self.learning_rate = adapted(rate, last["kl"], settings, caution)
         self.seconds["learning"] += time.perf_counter() - begin
         return {f"train/{name}": value for name, value in values.items()}
 

@@ -39,13 +39,6 @@ class Samples:
         """All samples, (T·n, width)."""
         return self.rows.view(-1, self.rows.shape[-1])
 
-    def finish(self, rewards: Array, ended: Mask, last_value: Array, discount: float, decay: float) -> None:
-        """Add advantages and targets; arguments as in `advantages`."""
-        values = self.columns["value"].cpu().numpy()
-        found = advantages(rewards, ended, values, last_value, discount, decay)
-        self.columns["advantage"].copy_(torch.from_numpy(found))
-        self.columns["target"].copy_(torch.from_numpy(found + values))
-
 
 def advantages(rewards: Array, ended: Mask, values: Array, last_value: Array, discount: float, decay: float) -> Array:
     """Generalised advantage estimates (Schulman et al. 2016, eq. 16), (T, n).

@@ -105,10 +105,8 @@ class TeacherTraining:
         After a collapse rolls back to the best policy; raises StageFailed after too many rollbacks."""
         model, begin = self.model, time.perf_counter()
         model.seconds = dict.fromkeys(model.seconds, 0.0)
-        model.caution = self.best.caution
-        model.restart_exploration()
         model.collect()
-        training = model.train()
+        training = model.train(self.best.caution)
         if self.settings.average_half_life is not None:
             half_life = self.settings.average_half_life / self._steps_an_update  # in updates
             weight, newest = np.float32(1.0 - 0.5 ** (1.0 / half_life)), acting_part(module_arrays(model.policy))

@@ -192,8 +192,8 @@ def low_state(tick: int, seen: Measured, torque: Array) -> Record:
 
 @contextmanager
 def object_tracking(port: int) -> Iterator[Callable[[Twin], None]]:
-    """Simulated motion capture, for `iowbc robot --object-pose`: a function, to be called after every period, that sends
-    the measured pose of the object, with the recipe's noise and latency, to a local port. Raises UsageError for port 0,
+    """Simulated motion capture, for `iowbc robot --object-pose`: a function that sends the measured pose of the object,
+    with the recipe's noise and latency, to a local port; call it after every period. Raises UsageError for port 0,
     which is valid only for a listener."""
     if port == 0:
         raise UsageError("--object-pose udp:0: nothing can be sent there; give the port of `iowbc robot`")
