@@ -20,24 +20,19 @@ class Samples:
     value before the update, advantage and value target. Each rollout overwrites the previous one.
     """
 
-    def __init__(
-        self, steps: int, environments: int, observation: int, actions: int, device: torch.device | None = None
-    ) -> None:
+    def __init__(self, steps: int, environments: int, observation: int, actions: int, device: torch.device) -> None:
         acting = dict.fromkeys(("action", "mean"), actions)
         sizes = {"observation": observation, **acting, **dict.fromkeys(SINGLE, 1)}
         self.places = places(sizes)
-        self.rows = torch.zeros(steps, environments, sum(sizes.values()), device=device)
-        self.columns = self.named(self.rows)
+        rows = torch.zeros(steps, environments, sum(sizes.values()), device=device)
+        self.columns = self.named(rows)
+        self.flat = rows.view(-1, rows.shape[-1])
+        """All samples, (T·n, width)."""
 
     def named(self, rows: Tensor) -> dict[str, Tensor]:
         """Views of rows (..., width) by column name; scalar columns drop the last axis."""
         views = {name: rows[..., place] for name, place in self.places.items()}
         return {name: view[..., 0] if name in SINGLE else view for name, view in views.items()}
-
-    @property
-    def flat(self) -> Tensor:
-        """All samples, (T·n, width)."""
-        return self.rows.view(-1, self.rows.shape[-1])
 
 
 def advantages(rewards: Array, ended: Mask, values: Array, last_value: Array, discount: float, decay: float) -> Array:
