@@ -36,7 +36,7 @@ class State(StrEnum):
     """The policy acts."""
 
 
-BEFORE = {State.STAND: (State.DAMPING,), State.RUN: (State.STAND,)}
+BEFORE = {State.STAND: State.DAMPING, State.RUN: State.STAND}
 """Required previous state; states that are not listed can follow any state."""
 MOVING = tuple(BEFORE)
 """States that change to damping on a fault."""
@@ -170,8 +170,8 @@ class Machine:
         limits, now = self.limits, self.sensors.posture
         if wanted not in BEFORE:
             return None
-        if self.state not in BEFORE[wanted]:
-            return f"it follows {' or '.join(BEFORE[wanted])}, and the robot is in {self.state}"
+        if self.state is not BEFORE[wanted]:
+            return f"it follows {BEFORE[wanted]}, and the robot is in {self.state}"
         if now is None:
             return "no state has arrived"
         if given.now - self._foreign < limits.command_age:
