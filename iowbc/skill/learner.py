@@ -38,16 +38,13 @@ class SkillTraining:
         }
         seen = sizes[ROBOT] if settings.algorithm == "ppo" else game.state_size
         self.critic = Trained(seen, 1, settings, VALUE_GAIN, settings.value_learning_rate)
+        self.trained = {**self.agents, "critic": self.critic}
         self.imitated = self._nothing_imitated()
         """Imitation dataset: the robot's observations and privileged actions."""
 
     def _nothing_imitated(self) -> dict[str, Tensor]:
         sizes = {"observation": self.game.observation_sizes[ROBOT], "action": self.game.action_sizes[ROBOT]}
         return {name: torch.zeros(0, size) for name, size in sizes.items()}
-
-    @property
-    def trained(self) -> dict[str, Trained]:
-        return {**self.agents, "critic": self.critic}
 
     @property
     def agent_share(self) -> float:
