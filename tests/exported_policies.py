@@ -66,15 +66,15 @@ def untrained(recipe: Recipe, robot: Robot, rg: Path | None, observe_object: boo
     torch.manual_seed(0)
     layout = observation_layout(robot, observe_object)
     student = StudentNetwork(layout.size, HISTORY, 15, 8, 8, [16], "elu", 10.0)
-    return graph_of(student, HISTORY, recipe, robot, layout, rg)
+    return graph_of(student, recipe, robot, layout, rg)
 
 
 def graph_of(
-    student: StudentNetwork, history: int, recipe: Recipe, robot: Robot, layout: ObservationLayout, rg: Path | None
+    student: StudentNetwork, recipe: Recipe, robot: Robot, layout: ObservationLayout, rg: Path | None
 ) -> ControllerGraph:
-    """The graph of a student that sees so many moments."""
+    """The graph of a student."""
     references = ReferenceLayer(robot, recipe.task.references, rg)
-    return ControllerGraph(student, robot, recipe.task, layout, history, references)
+    return ControllerGraph(student, robot, recipe.task, layout, references)
 
 
 @pytest.fixture(scope="session")

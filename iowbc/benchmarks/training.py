@@ -14,6 +14,7 @@ from iowbc.benchmarks.standing_generator import benchmark_world
 from iowbc.control.action import action_mirror
 from iowbc.learning.computing import prepare_process
 from iowbc.learning.perceptron import ACTIVATIONS
+from iowbc.learning.ppo import Learner
 from iowbc.learning.teacher import TeacherTraining
 from iowbc.processes import available_cores
 from iowbc.recipe.recipe import Recipe
@@ -43,7 +44,7 @@ def main(recipe: Recipe, *, scene: str = "lift", turns: int = 6, others: int | N
         other = _plain(specification, scene, count, samples)
         try:
             prepare_process()
-            training = TeacherTraining(settings, environments, mirrors, recipe.seed, cores=cores)
+            training = TeacherTraining(Learner(settings, environments, mirrors, recipe.seed, cores=cores))
             rows, rates, other_rates = [], [], []
             for _ in range(turns + 1):
                 begin = time.perf_counter()

@@ -74,8 +74,8 @@ def play(
             raise UsageError("a game has an object (--mass above 0) and no random --disturbances: its human disturbs")
         if page is not None and partner is not None:
             raise UsageError("--web and --partner exclude each other: on the page you are the human")
+        from iowbc.skill.episodes import AGENT, PERSON, Plan
         from iowbc.skill.game import NOMINAL, ROBOT
-        from iowbc.skill.plan import AGENT, PERSON, Plan
         from iowbc.skill.single_game import SingleGame
 
         world, student, robot, task = playable_skill(store, skill, scene)
@@ -133,7 +133,7 @@ def _serve(console: Console, port: int, session: "Played", **shown: Any) -> None
 
 
 def _play_game(console: Console, game: "SingleGame", title: str, video: Path | None) -> None:
-    from iowbc.skill.playing import film_game, show_game
+    from iowbc.skill.single_game import film_game, show_game
 
     tell(console, title)
     made = ""

@@ -164,8 +164,7 @@ def robot_sim(
     page = options.page_port(web, port)
     from iowbc.evaluation.exported import exported_world
     from iowbc.onboard.dds import DdsBus
-    from iowbc.twin.process import ObjectTracking, serve
-    from iowbc.twin.robot import Twin
+    from iowbc.twin.robot import Twin, object_tracking, serve
     from iowbc.twin.support import Support
 
     console = stdout_console()
@@ -185,7 +184,7 @@ def robot_sim(
     twin = Twin(controller.robot, simulation, frequency, scene, seed, posture, Support(kind, release), fixed)
     stop, reported = _stop_request(), False
     with ExitStack() as stack:
-        tracking = None if pose_port is None else stack.enter_context(closing(ObjectTracking(pose_port)))
+        tracking = None if pose_port is None else stack.enter_context(object_tracking(pose_port))
         view = None
         if page is not None:
             from iowbc.live.remote_view import RemoteView
@@ -198,7 +197,7 @@ def robot_sim(
         def watch(robot: Twin) -> None:
             nonlocal reported, view
             if tracking is not None:
-                tracking.send(robot)
+                tracking(robot)
             if view is not None and robot.periods % POLLING == 0:
                 try:
                     _show(robot, view)

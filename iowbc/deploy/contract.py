@@ -16,7 +16,7 @@ from iowbc.control.generator import ARCHITECTURE, WEIGHTS
 from iowbc.deploy.exported_folder import CONTRACT, GENERATOR, ROBOT, SETTLE, STEP
 from iowbc.errors import ContractBroken
 from iowbc.files import file_digest
-from iowbc.recipe.section import NonNegative, Section, sentences
+from iowbc.recipe.section import NonNegative, Section
 from iowbc.recipe.simulation.simulation import SensorNoise
 from iowbc.recipe.task.commands import Commands
 from iowbc.recipe.task.joint_references import References
@@ -168,45 +168,12 @@ class Contract(Section):
         return self
 
 
-def metadata(contract: Contract) -> dict[str, str]:
-    """Metadata of both ONNX files: the contract without file digests, and main entries by other exporters' names."""
-
-    def listed(values: tuple[float, ...]) -> str:
-        return ",".join(f"{value:g}" for value in values)
-
-    return {
-        "recipe": contract.recipe,
-        **contract.sources,
-        "joint_names": ",".join(contract.joints),
-        "joint_stiffness": listed(contract.kp),
-        "joint_damping": listed(contract.kd),
-        "default_joint_pos": listed(contract.default_position),
-        "action_scale": listed(contract.action_scale),
-        "command_names": ",".join(contract.command),
-        "observation_names": ",".join(part.name for part in contract.observation),
-        "contract": contract.model_dump_json(exclude={"files"}),
-    }
-
-
-def meanings(section: type[Section], path: str = "") -> dict[str, str]:
-    """Attribute docstring of each field of a section, and of its subsections, by dotted path."""
-    found = {f"{path}{name}": sentence.replace("\n", " ") for name, sentence in sentences(section).items()}
-    for name, about in section.model_fields.items():
-        if isinstance(about.annotation, type) and issubclass(about.annotation, Section):
-            found |= meanings(about.annotation, f"{path}{name}.")
-    return found
-
-
-def seal(contract: Contract, folder: Path) -> Contract:
-    """Write `contract.json` with the digest of every file now in the folder."""
-    files = sorted(path for path in folder.rglob("*") if path.is_file() and path != folder / CONTRACT)
-    return write_sealed(contract, folder / CONTRACT, [str(path.relative_to(folder)) for path in files])
-
-
-def write_sealed(contract: Kind, path: Path, files: Iterable[str]) -> Kind:
-    """Write a contract to a file, with the digests of other files of its folder."""
-    sealed = contract.model_copy(update={"files": {name: file_digest(path.parent / name) for name in files}})
-    path.write_text(sealed.model_dump_json(indent=1) + "\n", encoding="utf-8")
+def seal(contract: Kind, folder: Path, name: str = CONTRACT, files: Iterable[str] = ()) -> Kind:
+    """Write a contract as a file with the digests of these other files of its folder, by default all that are there."""
+    every = sorted(path for path in folder.rglob("*") if path.is_file() and path != folder / name)
+    sealed_files = files or [str(path.relative_to(folder)) for path in every]
+    sealed = contract.model_copy(update={"files": {file: file_digest(folder / file) for file in sealed_files}})
+    (folder / name).write_text(sealed.model_dump_json(indent=1) + "\n", encoding="utf-8")
     return sealed
 
 

@@ -19,8 +19,7 @@ from iowbc.control.references import both_wrists
 from iowbc.control.sensors import Measured
 from iowbc.deploy.contract import Contract, read_contract, readable, require_sealed
 from iowbc.deploy.exported_folder import CONTRACT, ROBOT, SETTLE, STEP, exported_folder
-from iowbc.deploy.guard import TargetGuard
-from iowbc.deploy.plausibility import WIDE, Limits, Plausibility
+from iowbc.deploy.plausibility import WIDE, Limits, Plausibility, TargetGuard
 from iowbc.errors import ContractBroken
 from iowbc.recipe.task.joint_references import Grasps
 from iowbc.robot.description import Robot, load_robot

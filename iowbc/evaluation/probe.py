@@ -40,7 +40,7 @@ class RecordingPolicy:
         """`length`: of the recorded history if the policy has none."""
         self.policy, self.every = policy, every
         self.student = policy.network if isinstance(policy, StudentPolicy) else None
-        self.length = policy.length if isinstance(policy, StudentPolicy) else length
+        self.length = policy.network.history if isinstance(policy, StudentPolicy) else length
         self.kept: list[dict[str, Features]] = []
         self._starts = np.ones(environments, np.bool_)
         self._history: History | None = None

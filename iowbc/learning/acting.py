@@ -47,9 +47,8 @@ class TeacherPolicy:
 class StudentPolicy:
     """The student with its observation history."""
 
-    def __init__(self, network: StudentNetwork, length: int) -> None:
+    def __init__(self, network: StudentNetwork) -> None:
         self.network = network
-        self.length = length
         self.history: History | None = None
         self.starts: NDArray[np.bool_] = np.ones(0, np.bool_)
 
@@ -61,7 +60,7 @@ class StudentPolicy:
 
     def act(self, observation: NDArray[np.float32], privileged: NDArray[np.float32]) -> NDArray[np.float32]:
         if self.history is None:
-            self.history = History(len(observation), self.length, self.network.observation)
+            self.history = History(len(observation), self.network.history, self.network.observation)
             self.starts = np.ones(len(observation), np.bool_)
         frames = self.history.push(observation[:, : self.network.observation], self.starts)
         self.starts[:] = False
@@ -76,14 +75,11 @@ def load_policy(folder: Path, layout: Mapping[str, Any] | None = None) -> Policy
     network, about = load_network(folder)
     if layout is not None:
         require_layout(folder, about, layout)
-    return policy_of(network, about["architecture"])
+    return policy_of(network)
 
 
-def policy_of(network: Network, architecture: Mapping[str, Any]) -> Policy:
-    """A network as a policy; `architecture`: the arguments that rebuild it."""
-    if isinstance(network, TeacherNetwork):
-        return TeacherPolicy(network)
-    return StudentPolicy(network, int(architecture["history"]))
+def policy_of(network: Network) -> Policy:
+    return TeacherPolicy(network) if isinstance(network, TeacherNetwork) else StudentPolicy(network)
 
 
 def unfinished_policy(path: Path, key: str, settings: Teacher, mirrors: Mirrors) -> Policy:
@@ -97,5 +93,5 @@ def unfinished_policy(path: Path, key: str, settings: Teacher, mirrors: Mirrors)
         if content is not None:
             saved = load(content)
             weights = under("policy", saved) | under("average", saved)
-            return policy_of(*trained_network(weights, settings, mirrors))
+            return policy_of(trained_network(weights, settings, mirrors)[0])
     raise Damaged(f"{path}: no whole checkpoint of this training")

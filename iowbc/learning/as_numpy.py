@@ -5,10 +5,9 @@ import torch
 from torch import Tensor, nn
 
 from iowbc.arrays import Array
-from iowbc.learning.history_actor import HistoryActor
 from iowbc.learning.networks import MirroredEncoder, Normalizer, StudentNetwork, TeacherNetwork
 from iowbc.learning.perceptron import DenseMlp
-from iowbc.learning.policy import ActorCritic
+from iowbc.learning.policy import ActorCritic, HistoryActor
 from iowbc.learning.symmetric import SymmetricHead, SymmetricMlp
 from iowbc.rollouts.policies import HistoryEncoder, HistoryPolicy, Layers, Linear, Normal, RowPolicy
 
@@ -17,7 +16,7 @@ def acting_policy(policy: ActorCritic) -> RowPolicy | HistoryPolicy:
     """NumPy policy of the mean action of PPO's policy."""
     normalizer, actor = policy.normalizer, policy.actor
     if isinstance(actor, HistoryActor):
-        return student_policy(actor.network, _normal(normalizer, actor.observation))
+        return student_policy(actor.network, _normal(normalizer, actor.network.observation))
     return RowPolicy(_normal(normalizer), _layers(actor))
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import torch
@@ -13,6 +13,7 @@ from torch import nn
 from iowbc.files import newest_checked, write_checked
 
 Arrays = dict[str, NDArray[Any]]
+Kind = TypeVar("Kind")
 
 
 def save_checkpoint(path: Path, key: str, arrays: Mapping[str, NDArray[Any]]) -> None:
@@ -36,9 +37,10 @@ def prefixed(prefix: str, arrays: Mapping[str, NDArray[Any]]) -> Arrays:
     return {f"{prefix}/{name}": value for name, value in arrays.items()}
 
 
-def under(prefix: str, arrays: Mapping[str, NDArray[Any]]) -> Arrays:
-    """The arrays whose names begin with `prefix/`, with the prefix removed."""
-    return {name[len(prefix) + 1 :]: value for name, value in arrays.items() if name.startswith(prefix + "/")}
+def under(prefix: str, arrays: Mapping[str, Kind], separator: str = "/") -> dict[str, Kind]:
+    """The arrays or tensors whose names begin with the prefix and `separator`, with both removed."""
+    beginning = prefix + separator
+    return {name.removeprefix(beginning): value for name, value in arrays.items() if name.startswith(beginning)}
 
 
 def module_arrays(module: nn.Module) -> Arrays:

@@ -14,7 +14,6 @@ from torch import Tensor
 
 from iowbc.processes import keep_freed_memory
 
-Precision = Literal["auto", "float32", "bfloat16"]
 Result = TypeVar("Result")
 
 
@@ -40,7 +39,7 @@ class ParallelBatch:
         return list(map(function, parts) if self._pool is None else self._pool.map(function, parts))
 
 
-def reduced(precision: Precision) -> AbstractContextManager[None]:
+def reduced(precision: Literal["auto", "float32", "bfloat16"]) -> AbstractContextManager[None]:
     """Context in which layers multiply in bfloat16: if `precision` says so, or for "auto" if the processor can
     (avx512_bf16 or amx); without, it is emulated and slower.
 

@@ -16,6 +16,8 @@ from iowbc.recipe.distillation import Distillation
 from iowbc.robot.mirror import MirrorMap
 
 Symmetry = Literal["construction", "none"]
+KEPT = ("observations", "targets", "ages")
+"""Arrays of a replay buffer."""
 
 
 def spread(environments: int) -> NDArray[np.float64]:
@@ -60,17 +62,11 @@ class ReplayBuffer:
         return frames, self.targets[times % self.steps, environments]
 
     def arrays(self) -> Arrays:
-        return {
-            "observations": self.observations,
-            "targets": self.targets,
-            "ages": self.ages,
-            "added": np.array([self.added]),
-        }
+        return {name: getattr(self, name) for name in KEPT} | {"added": np.array([self.added])}
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
-        self.observations[:] = arrays["observations"]
-        self.targets[:] = arrays["targets"]
-        self.ages[:] = arrays["ages"]
+        for name in KEPT:
+            getattr(self, name)[:] = arrays[name]
         self.added = int(arrays["added"][0])
 
 

@@ -9,6 +9,7 @@ from torch import Tensor, nn
 
 from iowbc.learning.perceptron import ACTIVATIONS, DenseMlp, VectorPerceptron
 from iowbc.learning.symmetric import SymmetricHead, SymmetricMlp, paired
+from iowbc.recipe.teacher import Teacher
 from iowbc.robot.mirror import MirrorMap, side_by_side
 
 Mirrors = tuple[MirrorMap, MirrorMap]
@@ -57,10 +58,6 @@ class Normalizer(nn.Module):
 
     def forward(self, x: Tensor) -> Tensor:
         return torch.clamp((x - self.mean) / self.std, -self.clip, self.clip)
-
-    def newest(self, rows: Any) -> Any:
-        """Part of rows described by the statistics, shape (..., size): here all."""
-        return rows
 
 
 class TeacherNetwork(nn.Module):
@@ -173,7 +170,7 @@ class StudentNetwork(nn.Module):
         `TeacherNetwork`. `privileged`: mirror of s_priv if the body receives an estimate of it, otherwise None."""
         super().__init__()
         del encoder  # named in the architectures of earlier versions, which had others, too
-        self.observation = observation
+        self.observation, self.history = observation, history
         self.normalizer = Normalizer(observation, clip)
         both = mirrors_from_json(mirrors)
         extra = None if privileged is None else mirror_from_json(privileged)
@@ -206,3 +203,25 @@ class StudentNetwork(nn.Module):
     def body_context(self, latent: Tensor) -> Tensor:
         """Second input of the body: the latent, or the estimate of s_priv."""
         return latent if self.estimate is None else cast(Tensor, self.estimate(latent))
+
+
+def student_architecture(teacher: Teacher, observation: int, actions: int, mirrors: Mirrors) -> dict[str, Any]:
+    """Arguments of a recipe's `StudentNetwork`; `mirrors`: of a row (s_t, s_priv) and of an action."""
+    assert teacher.history is not None
+    rows, action = mirrors
+    sign = np.asarray(rows.sign)
+    own = MirrorMap(rows.permutation[:observation], sign[:observation])
+    privileged = MirrorMap(rows.permutation[observation:] - observation, sign[observation:])
+    return {
+        "observation": observation,
+        "history": teacher.history.length,
+        "actions": actions,
+        "frame_features": teacher.history.frame_features,
+        "latent": teacher.history.latent,
+        "hidden": list(teacher.hidden),
+        "activation": teacher.activation,
+        "clip": teacher.normalization_clip,
+        "encoder": teacher.history.encoder,
+        "mirrors": mirrors_as_json((own, action), teacher.symmetry),
+        "privileged": mirror_as_json(privileged) if teacher.history.estimate else None,
+    }

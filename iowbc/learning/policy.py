@@ -1,4 +1,5 @@
-"""Policy and value network as a stable-baselines3 policy; its conversion to a deployable network, and back."""
+"""Policy and value network as a stable-baselines3 policy, on rows (s_t, s_priv) or (H_t, s_priv); its conversion to a
+deployable network, and back."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -9,9 +10,8 @@ from numpy.typing import NDArray
 from stable_baselines3.common.policies import ActorCriticPolicy
 from torch import Tensor, nn
 
-from iowbc.learning.checkpoint import Arrays
+from iowbc.learning.checkpoint import Arrays, under
 from iowbc.learning.gaussian import log_density, std_places
-from iowbc.learning.history_actor import HistoryActor, HistoryNormalizer, NewestCritic, student_architecture
 from iowbc.learning.networks import (
     Mirrors,
     Normalizer,
@@ -20,8 +20,9 @@ from iowbc.learning.networks import (
     mirrors_as_json,
     mirrors_from_json,
     perceptron,
+    student_architecture,
 )
-from iowbc.learning.perceptron import Perceptron, VectorPerceptron
+from iowbc.learning.perceptron import Hidden, Perceptron, VectorPerceptron
 from iowbc.learning.storage import Network
 from iowbc.recipe.teacher import Teacher
 from iowbc.robot.mirror import MirrorMap
@@ -32,6 +33,59 @@ HIDDEN_GAIN, POLICY_GAIN, VALUE_GAIN = float(np.sqrt(2.0)), 0.01, 1.0
 """Gains of the initial orthogonal weights, as in stable-baselines3. The policy starts close to the reference."""
 ACTS = ("actor.", "log_stds")
 """Name prefixes of the arrays of an `ActorCritic` that determine its actions."""
+
+
+class HistoryNormalizer(Normalizer):
+    """Normalisation of rows (H_t, s_priv) by the statistics of (s_t, s_priv), equal for all steps of a history."""
+
+    def __init__(self, size: int, clip: float, observation: int, length: int) -> None:
+        """`size`: of (s_t, s_priv); `observation`: of s_t; `length`: observations in a history."""
+        super().__init__(size, clip)
+        places = torch.arange(size)
+        self._places = torch.cat([places[:observation].repeat(length - 1), places])
+
+    def forward(self, x: Tensor) -> Tensor:
+        mean, std = self.mean[self._places], self.std[self._places]
+        return (x - mean).div_(std).clamp_(-self.clip, self.clip)
+
+
+class HistoryActor(Perceptron):
+    """The student's network without its input normalisation."""
+
+    def __init__(self, architecture: Mapping[str, Any]) -> None:
+        super().__init__()
+        self.network = StudentNetwork(**architecture)
+
+    def hidden(self, prepared: Tensor) -> Hidden:
+        network, flat = self.network, prepared.reshape(-1, prepared.shape[-1])
+        frames = flat[:, : network.history * network.observation].reshape(-1, network.history, network.observation)
+        both = torch.cat([frames[:, -1], network.body_context(network.encoder(frames))], dim=1)
+        parts = network.body.hidden(network.body.prepare(both))
+        return tuple(part.reshape(*prepared.shape[:-1], -1) for part in parts)
+
+    def head(self, hidden: Hidden) -> Tensor:
+        return self.network.body.head(hidden)
+
+    def initialize(self, gain: float, last: float) -> None:
+        self.network.body.initialize(gain, last)
+
+
+class NewestCritic(Perceptron):
+    """Critic of (s_t, s_priv) alone: s_priv contains what the actor must infer from the history."""
+
+    def __init__(self, critic: Perceptron, newest: slice) -> None:
+        """`newest`: place of (s_t, s_priv) in a row."""
+        super().__init__()
+        self.critic, self._newest = critic, newest
+
+    def hidden(self, prepared: Tensor) -> Hidden:
+        return self.critic.hidden(self.critic.prepare(prepared[..., self._newest]))
+
+    def head(self, hidden: Hidden) -> Tensor:
+        return self.critic.head(hidden)
+
+    def initialize(self, gain: float, last: float) -> None:
+        self.critic.initialize(gain, last)
 
 
 class ActorCritic(ActorCriticPolicy):  # type: ignore[misc]
@@ -67,15 +121,19 @@ class ActorCritic(ActorCriticPolicy):  # type: ignore[misc]
         self.normalizer: Normalizer
         self.actor: Perceptron
         self.critic: Perceptron
+        self.newest = slice(0, None)
+        """Place of (s_t, s_priv) in a row."""
         if student is None:
             self.normalizer = Normalizer(inputs, clip)
             self.actor = perceptron(inputs, hidden, actions, activation, both)
             self.critic = perceptron(inputs, hidden, 1, activation, value)
         else:
-            newest = inputs - (student["history"] - 1) * student["observation"]
-            self.normalizer = normalizer = HistoryNormalizer(newest, clip, student)
+            length, observation = student["history"], student["observation"]
+            self.newest = slice((length - 1) * observation, None)
+            size = inputs - self.newest.start
+            self.normalizer = HistoryNormalizer(size, clip, observation, length)
             self.actor = HistoryActor(student)
-            self.critic = NewestCritic(perceptron(newest, hidden, 1, activation, value), normalizer)
+            self.critic = NewestCritic(perceptron(size, hidden, 1, activation, value), self.newest)
         self.actor.initialize(HIDDEN_GAIN, POLICY_GAIN)
         self.critic.initialize(HIDDEN_GAIN, VALUE_GAIN)
         self._value_only = tuple(value_only)
@@ -109,12 +167,7 @@ class ActorCritic(ActorCriticPolicy):  # type: ignore[misc]
         return self.log_stds[self.std_place]
 
     def finite(self) -> bool:
-        """True if every parameter is finite."""
         return all(bool(torch.isfinite(parameter).all()) for parameter in self.parameters())
-
-    def prepared(self, observations: Tensor) -> Tensor:
-        """Observations, (n, S), as inputs of both networks in training: normalised, in their mirror basis."""
-        return self.actor.prepare(self.normalizer(observations))
 
     def forward(self, obs: Tensor, deterministic: bool = False) -> tuple[Tensor, Tensor, Tensor]:
         mean, log_std = self._mean(obs), self.log_std
@@ -160,12 +213,12 @@ def trained_network(
                 "mirrors": mirrors_as_json(mirrors, settings.symmetry),
             }
             network = TeacherNetwork(**architecture)
-            network.body.load_state_dict(_part("actor.", arrays))
+            network.body.load_state_dict(under("actor", arrays, "."))
         else:
             seen = len(arrays["actor.network.normalizer.mean"])
             architecture = student_architecture(settings, seen, actions, mirrors)
             network = StudentNetwork(**architecture)
-            network.load_state_dict(_part("actor.network.", arrays))
+            network.load_state_dict(under("actor.network", arrays, "."))
             mean, std = mean[:seen], std[:seen]
     network.normalizer.mean.copy_(mean)
     network.normalizer.std.copy_(std)
@@ -184,7 +237,3 @@ def load_policy_weights(policy: ActorCritic, network: Network) -> None:
     policy.hide()
     with torch.no_grad():
         policy.log_stds[policy.std_place] = network.log_std.to(policy.log_stds.device)
-
-
-def _part(beginning: str, arrays: Mapping[str, Tensor]) -> dict[str, Tensor]:
-    return {name.removeprefix(beginning): value for name, value in arrays.items() if name.startswith(beginning)}

@@ -19,17 +19,16 @@ from stable_baselines3.common.utils import set_random_seed
 from torch import Tensor
 
 from iowbc.arrays import Array
-from iowbc.learning.advantages import drawn_leaders, without_common_part
 from iowbc.learning.as_numpy import acting_policy
 from iowbc.learning.checkpoint import Arrays, module_arrays, restore_module
 from iowbc.learning.computing import ParallelBatch, reduced
+from iowbc.learning.environments import Environments
 from iowbc.learning.gaussian import divergence, entropy, exploration, log_density
-from iowbc.learning.history_actor import student_architecture
-from iowbc.learning.networks import Mirrors, mirrors_as_json
+from iowbc.learning.networks import Mirrors, mirrors_as_json, student_architecture
 from iowbc.learning.normalization import Normalization
 from iowbc.learning.perceptron import Perceptron
 from iowbc.learning.policy import ActorCritic, acting_part
-from iowbc.learning.rollout import Samples
+from iowbc.learning.rollout import Samples, advantages, drawn_leaders, without_common_part
 from iowbc.recipe.skill.skill import SkillLearning
 from iowbc.recipe.teacher import Teacher
 from iowbc.rollouts.blocks import block_size
@@ -46,17 +45,18 @@ class Learner:
     def __init__(
         self,
         teacher: Teacher,
-        env: Any,
-        seed: int,
+        env: Environments,
         mirrors: Mirrors,
-        cores: int,
+        seed: int,
+        *,
+        cores: int = 1,
         value_only: Sequence[int] = (),
         device: str = "cpu",
     ) -> None:
-        """`mirrors`: of observation and action; `cores`: for network updates; `value_only`: indices of observations
-        for the value network only; `device`: torch device of the networks."""
+        """`mirrors`: of observation and action; `cores`: for network updates, while the environments are idle;
+        `value_only`: indices of observations for the value network only; `device`: torch device of the networks."""
         set_random_seed(seed)
-        self.settings, self.env, self.device = teacher, env, torch.device(device)
+        self.settings, self.env, self.mirrors, self.device = teacher, env, mirrors, torch.device(device)
         self._on_cpu = self.device.type == "cpu"
         self.in_parallel = ParallelBatch(teacher.parts if self._on_cpu else 1, cores)
         self._arguments = _policy_arguments(teacher, env, mirrors, value_only)
@@ -84,8 +84,6 @@ class Learner:
         the update has not seen, while -`policy_loss` is one from those that it has."""
         self.seconds = dict.fromkeys(("simulation", "inference", "learning"), 0.0)
         """Time per part since the last reset [s]."""
-        self.caution = 1.0
-        """Factor of the desired KL divergence."""
         self.value_alone = 0
         """Environment steps up to which only the value network learns: the policy's rate is zero, not its moments."""
 
@@ -119,7 +117,10 @@ class Learner:
 
     def collect(self) -> None:
         """Collect one rollout into the samples. Its observations are normalised by statistics of earlier rollouts."""
-        policy, env, settings = self.policy, self.env, self.settings
+        policy, env, settings, restart = self.policy, self.env, self.settings, self.settings.restart
+        if restart is not None and self.steps - settings.rollout * env.num_envs < restart.after <= self.steps:
+            with torch.no_grad():  # once, at the first rollout after the recipe's restart step
+                policy.log_stds.fill_(float(np.log(restart.std)))
         if self.observation is None:
             self.observation = env.reset()
         if settings.group > 1:
@@ -156,20 +157,24 @@ class Learner:
             values = self.policy.predict_values(self._tensor(behind))[:, 0].cpu().numpy()
         cut_steps, environments = found.cut.T
         rewards[cut_steps, environments] += settings.gamma * values[shape[1] :]
-        samples.finish(rewards, found.ended, values[: shape[1]], settings.gamma, settings.gae_lambda)
+        value = columns["value"].cpu().numpy()
+        last = values[: shape[1]]
+        advantage = advantages(rewards, found.ended, value, last, settings.gamma, settings.gae_lambda)
+        columns["target"].copy_(torch.from_numpy(advantage + value))
         self.explained = explained_variance(columns["value"], columns["target"])
         if settings.group > 1:
-            own = without_common_part(columns["advantage"].cpu().numpy(), found.ended, settings.group)
-            columns["advantage"].copy_(torch.from_numpy(own))
+            advantage = without_common_part(advantage, found.ended, settings.group)
+        columns["advantage"].copy_(torch.from_numpy(advantage))
         self.gain = self._gain() if self.former else None
-        self.normalization.observe(self.policy.normalizer.newest(rows))
+        self.normalization.observe(rows[:, self.policy.newest])
 
     def _tensor(self, values: Array) -> Tensor:
         return torch.from_numpy(values).to(self.device)
 
     def _prepare(self, rows: Tensor) -> Tensor:
+        """Rows, (n, S), as inputs of both networks: normalised, in their mirror basis."""
         with torch.inference_mode():
-            return self.policy.prepared(rows)
+            return self.policy.actor.prepare(self.policy.normalizer(rows))
 
     def _judge(self, samples: Tensor) -> None:
         """Write the policy's mean, the log density of the action and the value into rows of samples."""
@@ -199,15 +204,8 @@ class Learner:
             hidden = actor.hidden(samples["observation"])
         return actor.head(hidden)
 
-    def restart_exploration(self) -> None:
-        """Reset the standard deviation once, before the first update after the recipe's restart step."""
-        restart, passed = self.settings.restart, self.steps - self.settings.rollout * self.env.num_envs
-        if restart is not None and passed < restart.after <= self.steps:
-            with torch.no_grad():
-                self.policy.log_stds.fill_(float(np.log(restart.std)))
-
-    def train(self) -> dict[str, float]:
-        """Gradient steps on the samples; returns their statistics."""
+    def train(self, caution: float) -> dict[str, float]:
+        """Gradient steps on the samples; returns their statistics. `caution`: factor of the desired KL divergence."""
         settings, optimizer, begin = self.settings, self.policy.optimizer, time.perf_counter()
         rate = self.learning_rate if self._policy_learns else settings.learning_rate
         moved = float(self._policy_learns)
@@ -228,7 +226,7 @@ class Learner:
         values |= {} if self.gain is None else {"gain": self.gain}
         values |= {"std": float(torch.exp(self.policy.log_std.detach()).mean()), "learning_rate": rate}
         if self._policy_learns:
-            self.learning_rate = adapted(rate, last["kl"], settings, self.caution)
+            self.learning_rate = adapted(rate, last["kl"], settings, caution)
         self.seconds["learning"] += time.perf_counter() - begin
         return {f"train/{name}": value for name, value in values.items()}
 

@@ -65,24 +65,18 @@ def _eigenvectors(mirror: MirrorMap) -> tuple[list[Any], list[Any]]:
     return even, odd
 
 
-class PairedActivation(nn.Module):
+def activated_pairs(activation: Activation, even: Tensor, odd: Tensor) -> Parts:
     """Activation of unit pairs (a, b). Inputs are (a + b) / 2 and (a - b) / 2, outputs a' + b' and a' - b'. Mirroring
     swaps a and b: the first output stays, the second changes sign, whatever the activation."""
-
-    def __init__(self, name: str) -> None:
-        super().__init__()
-        self.activation = ACTIVATIONS[name]
-
-    def forward(self, even: Tensor, odd: Tensor) -> tuple[Tensor, Tensor]:
-        if even.requires_grad:
-            sums, differences = _Paired.apply(even, odd, self.activation)  # type: ignore[no-untyped-call]
-            return sums, differences
-        one, other = self.activation.function(even + odd), self.activation.function(even - odd)
-        return one + other, one - other
+    if even.requires_grad:
+        sums, differences = _Paired.apply(even, odd, activation)  # type: ignore[no-untyped-call]
+        return sums, differences
+    one, other = activation.function(even + odd), activation.function(even - odd)
+    return one + other, one - other
 
 
 class _Paired(Function):
-    """`PairedActivation` with a backward pass of half the steps and memory of torch's automatic one."""
+    """`activated_pairs` with a backward pass of half the steps and memory of torch's automatic one."""
 
     @staticmethod
     def forward(ctx: Any, even: Tensor, odd: Tensor, activation: Activation) -> tuple[Tensor, Tensor]:
@@ -108,11 +102,11 @@ class SymmetricLayers(nn.Module):
         halves = [paired(size) for size in hidden]
         self.even = nn.ModuleList(itertools.starmap(nn.Linear, itertools.pairwise([even, *halves])))
         self.odd = nn.ModuleList(nn.Linear(*sizes, bias=False) for sizes in itertools.pairwise([odd, *halves]))
-        self.activation = PairedActivation(activation)
+        self.activation = ACTIVATIONS[activation]
 
     def forward(self, even: Tensor, odd: Tensor) -> Parts:
         for keep, negate in zip(self.even, self.odd, strict=True):
-            even, odd = self.activation(keep(even), negate(odd))
+            even, odd = activated_pairs(self.activation, keep(even), negate(odd))
         return even, odd
 
     def initialize(self, gain: float) -> None:

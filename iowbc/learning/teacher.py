@@ -1,7 +1,8 @@
 """Teacher training by PPO (paper III-C)."""
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,14 +12,11 @@ from numpy.typing import NDArray
 from iowbc.errors import StageFailed
 from iowbc.learning import checkpoint
 from iowbc.learning.acting import Policy, policy_of
-from iowbc.learning.best import Best
 from iowbc.learning.checkpoint import Arrays, module_arrays, prefixed, under
-from iowbc.learning.environments import Environments
-from iowbc.learning.networks import Mirrors
 from iowbc.learning.policy import acting_part, load_policy_weights, trained_network
 from iowbc.learning.ppo import Learner
 from iowbc.learning.storage import Network
-from iowbc.recipe.teacher import Teacher
+from iowbc.recipe.teacher import Check
 
 FLOOR_REACHED = 1.01
 """A standard deviation within this factor of its floor counts as at the floor."""
@@ -29,37 +27,73 @@ Score = Callable[[Policy], Mapping[str, float]]
 """Evaluation of a policy: metrics that include `score`, higher is better."""
 
 
+@dataclass
+class Best:
+    """Best learner state so far, with rollback to it after a collapse."""
+
+    settings: Check
+    learner: Arrays
+    """At first the state before the first update."""
+    score: float = 0.0
+    caution: float = 1.0
+    """Factor of the desired KL divergence."""
+    rollbacks: int = 0
+    """Rollbacks since the last improvement."""
+    low: int = 0
+    """Number of consecutive scores far below the best."""
+
+    def collapsed(self, score: float) -> bool:
+        """True if this is the last of `patience` consecutive scores far below the best."""
+        far_below = self.score >= self.settings.notable and score < (1.0 - self.settings.collapse) * self.score
+        self.low = self.low + 1 if far_below else 0
+        return self.low >= self.settings.patience
+
+    def offer(self, score: float, learner: Arrays) -> None:
+        """Keep this learner state if its score equals or exceeds the best."""
+        if score >= self.score:
+            self.score, self.learner, self.rollbacks = score, learner, 0
+
+    def go_back(self, why: str) -> Arrays:
+        """Best learner state; also lowers `caution`. Raises StageFailed after too many rollbacks."""
+        self.rollbacks += 1
+        if self.rollbacks > self.settings.rollbacks:
+            raise StageFailed(
+                f"{why}, and all teacher.check.rollbacks ({self.settings.rollbacks}) are used up; lower "
+                "teacher.desired_kl or teacher.learning_rate, or raise it"
+            )
+        self.caution *= self.settings.caution
+        self.low = 0
+        return self.learner
+
+    def arrays(self) -> Arrays:
+        return {
+            **prefixed("learner", self.learner),
+            "score": np.array([self.score, self.caution]),
+            "rollbacks": np.array([self.rollbacks, self.low]),
+        }
+
+    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        self.learner = under("learner", arrays)
+        self.score, self.caution = arrays["score"].tolist()
+        self.rollbacks, self.low = arrays["rollbacks"].tolist()
+
+
 class TeacherTraining:
     """PPO with privileged information. Between two updates, `arrays` is its complete state."""
 
-    def __init__(
-        self,
-        settings: Teacher,
-        environments: Environments,
-        mirrors: Mirrors,
-        seed: int,
-        *,
-        cores: int = 1,
-        value_only: Sequence[int] = (),
-        device: str = "cpu",
-        score: Score | None = None,
-        say: Callable[[str], None] = print,
-    ) -> None:
-        """`mirrors`: of observation and action; `cores`: for network updates, while the environments are idle;
-        `value_only`: indices of observations for the value network only; `device`: torch device of the networks;
-        `score`: fixed evaluation that selects the best policy; `say`: receives a message at each rollback."""
-        self.settings, self.environments, self.mirrors = settings, environments, mirrors
-        self.planned = settings.steps
+    def __init__(self, model: Learner, score: Score | None = None, say: Callable[[str], None] = print) -> None:
+        """`score`: fixed evaluation that selects the best policy; `say`: receives a message at each rollback."""
+        self.model, self.settings, self.environments = model, model.settings, model.env
+        self.planned = self.settings.steps
         """Environment steps of the whole training; the last update may exceed them."""
-        self.score = score if settings.check.every is not None else None
+        self.score = score if self.settings.check.every is not None else None
         self.say = say
-        self._steps_an_update = settings.environments * settings.rollout
-        self.model = Learner(settings, environments, seed, mirrors, cores, value_only, device)
+        self._steps_an_update = self.settings.environments * self.settings.rollout
         self.average: Arrays = {}
         """Exponentially weighted mean of the policies' acting parts; empty unless the recipe wants one."""
-        if settings.average_half_life is not None:
+        if self.settings.average_half_life is not None:
             self.average = acting_part(module_arrays(self.model.policy))
-        self.best = Best(settings.check, self._learner_state())
+        self.best = Best(self.settings.check, self._learner_state())
 
     @property
     def steps(self) -> int:
@@ -71,10 +105,8 @@ class TeacherTraining:
         After a collapse rolls back to the best policy; raises StageFailed after too many rollbacks."""
         model, begin = self.model, time.perf_counter()
         model.seconds = dict.fromkeys(model.seconds, 0.0)
-        model.caution = self.best.caution
-        model.restart_exploration()
         model.collect()
-        training = model.train()
+        training = model.train(self.best.caution)
         if self.settings.average_half_life is not None:
             half_life = self.settings.average_half_life / self._steps_an_update  # in updates
             weight, newest = np.float32(1.0 - 0.5 ** (1.0 / half_life)), acting_part(module_arrays(model.policy))
@@ -95,7 +127,7 @@ class TeacherTraining:
         elif float(deviation.mean()) <= FLOOR_REACHED * floor < COLLAPSED_SHARE * self.settings.std_end:
             why = "exploration died out"
         elif self.score is not None and updates % (self.settings.check.every or 1) == 0:
-            found = {f"check/{name}": float(value) for name, value in self.score(policy_of(*self.network())).items()}
+            found = {f"check/{name}": float(value) for name, value in self.score(policy_of(self.network()[0])).items()}
             figures |= found
             if self.best.collapsed(found["check/score"]):
                 why = f"the score fell from {self.best.score:.3f} to {found['check/score']:.3f}"
@@ -111,7 +143,7 @@ class TeacherTraining:
     def keep_best(self) -> None:
         """End the training: score the last policy, then restore the best learner state."""
         if self.score is not None:
-            self.best.offer(float(self.score(policy_of(*self.network()))["score"]), self._scored())
+            self.best.offer(float(self.score(policy_of(self.network()[0]))["score"]), self._scored())
             self._restore_learner(self.best.learner)
 
     def _learner_state(self) -> Arrays:
@@ -190,4 +222,4 @@ class TeacherTraining:
 
     def network(self) -> tuple[Network, dict[str, Any]]:
         """The deterministic policy with its normalisation, and the arguments that rebuild it."""
-        return trained_network(self._acting(), self.settings, self.mirrors)
+        return trained_network(self._acting(), self.settings, self.model.mirrors)

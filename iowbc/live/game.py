@@ -15,9 +15,9 @@ from iowbc.live.session import Played
 from iowbc.live.track import PAST, WINDOW, Moment, MomentRecorder, Track
 from iowbc.robot import rotations
 from iowbc.sim.rendering.forces import Force
+from iowbc.skill.episodes import Plan, Rule
 from iowbc.skill.game import NOMINAL
 from iowbc.skill.lower_layer import Student
-from iowbc.skill.plan import Plan, Rule
 from iowbc.skill.single_game import SingleGame
 from iowbc.task.specification import Specification
 

@@ -7,7 +7,7 @@ import json
 import os
 import queue
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, BinaryIO, Self
 
@@ -27,8 +27,35 @@ ABOUT = "iowbc"
 """Name of the metadata that a replay needs."""
 
 
-class LogWriter:
-    """Writes a log in its own thread, so that a slow disk does not delay the loop."""
+class Background:
+    """Passes items to a function in a thread of its own, so that a slow disk or terminal does not delay a loop, until
+    the function raises OSError."""
+
+    def __init__(self, name: str, function: Callable[[Any], None], patience: float | None = None) -> None:
+        """`patience`: longest wait for the items that are left at the end [s]; None waits for all."""
+        self.failure = ""
+        """Reason why no further items are passed."""
+        self._function, self._patience, self._items = function, patience, queue.SimpleQueue[Any]()
+        self._thread = threading.Thread(target=self._run, name=name, daemon=patience is not None)
+        self._thread.start()
+
+    def put(self, item: Any) -> None:
+        self._items.put(item)
+
+    def _run(self) -> None:
+        try:
+            while (item := self._items.get()) is not None:
+                self._function(item)
+        except OSError as error:
+            self.failure = error.strerror or str(error)
+
+    def close(self) -> None:
+        self._items.put(None)
+        self._thread.join(self._patience)
+
+
+class LogWriter(Background):
+    """Writes a log in its own thread; its `failure` says why the file can no longer be written."""
 
     def __init__(self, path: Path, about: dict[str, str]) -> None:
         """`about`: metadata for the replay. Raises UsageError if the file cannot be written."""
@@ -47,11 +74,7 @@ class LogWriter:
         for topic in JSON_TOPICS:
             schema = self._writer.register_schema(topic, "jsonschema", b'{"type": "object"}')
             self._channels[topic] = self._writer.register_channel(topic, "json", schema)
-        self._queue: queue.SimpleQueue[tuple[str, float, bytes] | None] = queue.SimpleQueue()
-        self.failure = ""
-        """Reason why the file can no longer be written."""
-        self._thread = threading.Thread(target=self._write, name="log")
-        self._thread.start()
+        super().__init__("log", self._write)
 
     def turn(self, given: CycleInputs, command: Record) -> bool:
         """Logs a cycle; False if the file can no longer be written."""
@@ -69,29 +92,24 @@ class LogWriter:
             charge=given.charge,
         )
         for state in given.states:
-            self._queue.put((TOPICS[LOW_STATE], given.now, to_cdr(state)))
-        self._queue.put((TOPICS[LOW_COMMAND], given.now, to_cdr(command)))
+            self.put((TOPICS[LOW_STATE], given.now, to_cdr(state)))
+        self.put((TOPICS[LOW_COMMAND], given.now, to_cdr(command)))
         return not self.failure
 
     def add(self, topic: str, at_time: float, **values: Any) -> None:
         """A JSON message at a time of the loop [s]."""
-        self._queue.put((topic, at_time, json.dumps(values).encode()))
+        self.put((topic, at_time, json.dumps(values).encode()))
 
-    def _write(self) -> None:
-        try:
-            while (entry := self._queue.get()) is not None:
-                topic, now, data = entry
-                time = round(1e9 * now)
-                self._writer.add_message(self._channels[topic], time, data, time)
-        except OSError as error:
-            self.failure = error.strerror or str(error)
+    def _write(self, entry: tuple[str, float, bytes]) -> None:
+        topic, now, data = entry
+        time = round(1e9 * now)
+        self._writer.add_message(self._channels[topic], time, data, time)
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *exception: object) -> None:
-        self._queue.put(None)
-        self._thread.join()
+        self.close()
         try:  # a file that cannot be finished is readable up to where it ends
             with self._file:
                 if not self.failure:

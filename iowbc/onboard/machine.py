@@ -13,7 +13,6 @@ import numpy as np
 
 from iowbc.arrays import Array
 from iowbc.control.command import COMMAND, HEIGHT
-from iowbc.control.sensors import quantities
 from iowbc.deploy.controller import Controller
 from iowbc.onboard import checks, messages
 from iowbc.onboard.checks import LIMITS, SafetyLimits
@@ -37,7 +36,7 @@ class State(StrEnum):
     """The policy acts."""
 
 
-BEFORE = {State.STAND: (State.DAMPING,), State.RUN: (State.STAND,)}
+BEFORE = {State.STAND: State.DAMPING, State.RUN: State.STAND}
 """Required previous state; states that are not listed can follow any state."""
 MOVING = tuple(BEFORE)
 """States that change to damping on a fault."""
@@ -83,7 +82,6 @@ class Machine:
         controller.reset(scene=scene)
         self._contract = contract = controller.contract
         self._joints = len(contract.joints)
-        self._observed = quantities(of_object=True).keys() & {port.name for port in contract.inputs}
         self.sensors, self._ranges = Sensors(self._joints), Ranges(contract)
         self.state = State.ZERO_TORQUE
         self.events: list[str] = []
@@ -172,8 +170,8 @@ class Machine:
         limits, now = self.limits, self.sensors.posture
         if wanted not in BEFORE:
             return None
-        if self.state not in BEFORE[wanted]:
-            return f"it follows {' or '.join(BEFORE[wanted])}, and the robot is in {self.state}"
+        if self.state is not BEFORE[wanted]:
+            return f"it follows {BEFORE[wanted]}, and the robot is in {self.state}"
         if now is None:
             return "no state has arrived"
         if given.now - self._foreign < limits.command_age:
@@ -201,9 +199,9 @@ class Machine:
             return "the command is not finite"
         if not pose:
             return None
-        if missing := self._observed - wanted.seen.keys():
+        if missing := self._ranges.seen.keys() - wanted.seen.keys():
             return f"no object pose: {', '.join(sorted(missing))}; this policy observes the object"
-        if self._observed and (age := given.now - wanted.seen_at) > limits.object_age:
+        if self._ranges.seen and (age := given.now - wanted.seen_at) > limits.object_age:
             return f"stale object pose: nothing new for {age:.2f} s"
         return None
 

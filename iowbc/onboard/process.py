@@ -4,8 +4,6 @@ import contextlib
 import ctypes
 import gc
 import os
-import queue
-import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -15,7 +13,7 @@ import numpy as np
 
 from iowbc.onboard import messages
 from iowbc.onboard.checks import BusSnapshot
-from iowbc.onboard.log import LogWriter
+from iowbc.onboard.log import Background, LogWriter
 from iowbc.onboard.machine import FREQUENCY, CycleInputs, Machine, State
 from iowbc.onboard.messages import Record
 from iowbc.onboard.operators import Operator
@@ -148,7 +146,7 @@ def drive(
     turns = 0
     begin: float | None = None
     leaving: float | None = None
-    with contextlib.closing(Teller(tell)) as teller, _damping_after_errors(bus, machine):
+    with contextlib.closing(Background("teller", tell, FINAL_DAMPING)) as teller, _damping_after_errors(bus, machine):
         kept = np.full((2, KEPT_TIMES), np.nan, np.float32)  # allocated in advance
         while True:
             now, states = clock.turn(bus)
@@ -191,24 +189,3 @@ def _damping_after_errors(bus: "DdsBus", machine: Machine) -> Iterator[None]:
             bus.publish(machine.damp())
             time.sleep(PERIOD)
         raise
-
-
-class Teller:
-    """Tells lines in a thread of its own, so that a terminal that blocks or is gone neither delays nor ends a loop."""
-
-    def __init__(self, tell: Callable[[str], None]) -> None:
-        self._tell, self._lines = tell, queue.SimpleQueue[str | None]()
-        self._thread = threading.Thread(target=self._run, name="teller", daemon=True)
-        self._thread.start()
-
-    def put(self, line: str) -> None:
-        self._lines.put(line)
-
-    def _run(self) -> None:
-        with contextlib.suppress(OSError):
-            while (line := self._lines.get()) is not None:
-                self._tell(line)
-
-    def close(self) -> None:
-        self._lines.put(None)
-        self._thread.join(FINAL_DAMPING)

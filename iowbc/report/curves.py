@@ -12,8 +12,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from iowbc.learning.curve_titles import title_of
-from iowbc.learning.curves import TABLE
+from iowbc.learning.curves import TABLE, title_of
 from iowbc.report.runs import Group
 from iowbc.results.picture import COLOURS
 from iowbc.stages.registry import STAGES

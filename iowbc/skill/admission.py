@@ -8,9 +8,9 @@ from itertools import product
 import numpy as np
 
 from iowbc.arrays import Array, Mask
+from iowbc.skill.episodes import ABSENT, CLOCK, Plan, Rule
 from iowbc.skill.game import NOMINAL, TransportGame, play_once
 from iowbc.skill.lower_layer import Student
-from iowbc.skill.plan import ABSENT, CLOCK, Plan, Rule
 from iowbc.task.specification import Specification
 
 SOLVED, UNSOLVED = 0.8, 0.2

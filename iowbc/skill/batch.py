@@ -13,15 +13,11 @@ from iowbc.robot.rotations import turned
 from iowbc.rollouts.blocks import block_size
 from iowbc.sim.objects import measured as shape_of
 from iowbc.skill import observation as seen
-from iowbc.skill.episode_draws import EpisodeDraws
-from iowbc.skill.figures import FIGURES, EpisodeFigures, internal_force
-from iowbc.skill.human import Human
+from iowbc.skill.episodes import CLOCK, KINDS, PERSON, RULES, EpisodeDraws
+from iowbc.skill.intentions import Human, NominalCommand, ObjectMotion, open_loop_motion, pursue
 from iowbc.skill.lower_layer import LowerLayer
-from iowbc.skill.object_motion import NominalCommand, ObjectMotion, open_loop_motion, pursue
-from iowbc.skill.path import Paths
-from iowbc.skill.plan import CLOCK, KINDS, PERSON, RULES
-from iowbc.skill.reward import GameEnding, ending, potential, reward
-from iowbc.skill.situation import GameState, Origin, situation
+from iowbc.skill.outcomes import FIGURES, EpisodeFigures, GameEnding, ending, internal_force, potential, reward
+from iowbc.skill.situation import GameState, Origin, Paths, situation
 from iowbc.task.episodes import Episode
 from iowbc.task.vector.shared import Buffers
 

@@ -9,10 +9,10 @@ from iowbc.arrays import Array, Keys, Mask
 from iowbc.errors import Interrupted
 from iowbc.learning.networks import TeacherNetwork
 from iowbc.skill.batch import GameBatch
-from iowbc.skill.figures import FIGURES
+from iowbc.skill.episodes import KINDS, Plan
 from iowbc.skill.lower_layer import Student
 from iowbc.skill.observation import sizes
-from iowbc.skill.plan import KINDS, Plan
+from iowbc.skill.outcomes import FIGURES
 from iowbc.skill.setup import GameSetup
 from iowbc.skill.trained import mean_actions
 from iowbc.task.specification import Specification

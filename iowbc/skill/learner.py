@@ -8,11 +8,11 @@ import torch
 from torch import Tensor
 
 from iowbc.arrays import Array, Indices, Keys
-from iowbc.learning.advantages import advantages
 from iowbc.learning.checkpoint import Arrays, prefixed, under
 from iowbc.learning.gaussian import divergence, entropy, log_density
 from iowbc.learning.policy import VALUE_GAIN
 from iowbc.learning.ppo import adapted, explained_variance
+from iowbc.learning.rollout import advantages
 from iowbc.recipe.skill.skill import SkillLearning
 from iowbc.skill.game import HUMAN, ROBOT, Observed, TransportGame
 from iowbc.skill.trained import Trained, mean_actions
@@ -38,16 +38,13 @@ class SkillTraining:
         }
         seen = sizes[ROBOT] if settings.algorithm == "ppo" else game.state_size
         self.critic = Trained(seen, 1, settings, VALUE_GAIN, settings.value_learning_rate)
+        self.trained = {**self.agents, "critic": self.critic}
         self.imitated = self._nothing_imitated()
         """Imitation dataset: the robot's observations and privileged actions."""
 
     def _nothing_imitated(self) -> dict[str, Tensor]:
         sizes = {"observation": self.game.observation_sizes[ROBOT], "action": self.game.action_sizes[ROBOT]}
         return {name: torch.zeros(0, size) for name, size in sizes.items()}
-
-    @property
-    def trained(self) -> dict[str, Trained]:
-        return {**self.agents, "critic": self.critic}
 
     @property
     def agent_share(self) -> float:

@@ -41,7 +41,7 @@ def load_student(folder: Path, world: Specification | None = None) -> Student:
     network, about = load_student_network(folder)
     if world is not None:
         require_layout(folder, about, full_layout(world.recipe, load_robot(world.robot)).describe())
-    return Student(student_policy(network), int(about["architecture"]["history"]), network.observation)
+    return Student(student_policy(network), network.history, network.observation)
 
 
 class LowerLayer(Batch):

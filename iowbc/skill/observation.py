@@ -8,8 +8,7 @@ from iowbc.recipe.simulation.partner import BEHAVIOURS
 from iowbc.recipe.skill.skill import Skill
 from iowbc.robot.rotations import turned, wrapped
 from iowbc.sim.simulation import Simulation
-from iowbc.skill.path import Paths
-from iowbc.skill.situation import GameState
+from iowbc.skill.situation import GameState, Paths
 from iowbc.task.motion import Motion
 
 DRAWN = {"partner_stiffness": 300.0, "partner_damping": 50.0, "partner_delay": 0.3, "partner_noise": 8.0}

@@ -7,9 +7,9 @@ from gymnasium import spaces
 from pettingzoo import ParallelEnv
 
 from iowbc.arrays import Array
+from iowbc.skill.episodes import AGENT, Plan
 from iowbc.skill.game import TransportGame
 from iowbc.skill.lower_layer import Student
-from iowbc.skill.plan import AGENT, Plan
 from iowbc.task.specification import Specification
 
 Values = dict[str, Any]

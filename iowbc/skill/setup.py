@@ -12,9 +12,9 @@ from iowbc.recipe.skill.skill import Skill
 from iowbc.recipe.skill.task import TransportTask
 from iowbc.skill import observation as seen
 from iowbc.skill.batch import HUMAN_ACTIONS, ROBOT_ACTIONS, GameBatch
-from iowbc.skill.figures import FIGURES
+from iowbc.skill.episodes import KINDS, Plan
 from iowbc.skill.lower_layer import Student
-from iowbc.skill.plan import KINDS, Plan
+from iowbc.skill.outcomes import FIGURES
 from iowbc.task.specification import Specification
 from iowbc.task.vector.setup import scene_of
 from iowbc.task.vector.shared import Buffers, Fields

@@ -1,15 +1,19 @@
 """One game in this process, advanced by control steps: for a person who plays it, a window and a film."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from contextlib import closing
+from pathlib import Path
 
 import numpy as np
 
+from iowbc.evaluation.films import Filming, velocity_text, written_film
+from iowbc.evaluation.play import in_window, require_display
 from iowbc.learning.networks import TeacherNetwork
 from iowbc.robot.rotations import turned
 from iowbc.sim.rendering.renderer import Line
+from iowbc.skill.episodes import Plan
 from iowbc.skill.game import COUNTED, TransportGame
 from iowbc.skill.lower_layer import Student
-from iowbc.skill.plan import Plan
 from iowbc.skill.trained import mean_actions
 from iowbc.task.specification import Specification
 
@@ -88,3 +92,44 @@ class SingleGame:
 
     def close(self) -> None:
         self._game.close()
+
+
+def show_game(game: SingleGame) -> None:
+    """Play a game from its beginning, in real time in a window. Raises NoDisplay, and Interrupted when it is closed."""
+    require_display()
+    with in_window(game.lower.simulation, game.lines()) as look:
+        _play_to_the_end(game, look)
+
+
+def film_game(game: SingleGame, path: Path, title: str, progress: Callable[[float, float], None]) -> int:
+    """Play a game from its beginning to an mp4 file, without a display; returns the number of frames. `title`: in every
+    frame; `progress` receives the rendered and the longest duration [s]. Raises NoRenderer."""
+    video = game.recipe.eval.video.model_copy(update={"duration": game.duration})
+    with (
+        written_film(path, video.fps) as add,
+        closing(Filming(game.lower.simulation, add, video, game.lines())) as filming,
+    ):
+
+        def look(seconds: float) -> None:
+            filming.look(seconds, lambda: [title, _state_line(game, seconds)])
+            progress(seconds, game.duration)
+
+        _play_to_the_end(game, look)
+        return filming.frames
+
+
+def _play_to_the_end(game: SingleGame, look: Callable[[float], None]) -> None:
+    look(0.0)
+    while not game.ending:
+        game.control()
+        look(game.seconds)
+        game.judge()
+
+
+def _state_line(game: SingleGame, seconds: float) -> str:
+    """Time, way along the path, horizontal force of the partner and velocity command of the skill, in words."""
+    now, lower = game.batch.now, game.lower
+    way = f"{now.covered[0]:.1f} of {now.covered[0] + now.left[0]:.1f} m"
+    force = np.linalg.norm(lower.simulation.state.partner_force[0, :2])
+    walk = velocity_text(lower.memory.command[0, :3])
+    return f"{seconds:4.1f} s   {way}   partner {force:2.0f} N   {walk}"

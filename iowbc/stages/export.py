@@ -28,8 +28,7 @@ def run(job: Job) -> None:
     from iowbc.evaluation.exported import ExportedPolicy, golden_inputs, run_acceptance
     from iowbc.export import golden
     from iowbc.export.folder import write_folder
-    from iowbc.export.graph import ControllerGraph
-    from iowbc.export.onnx_graph import run_torch
+    from iowbc.export.graph import ControllerGraph, run_torch
     from iowbc.learning.acting import policy_of
     from iowbc.learning.storage import load_student_network, require_layout
     from iowbc.robot.description import load_robot
@@ -42,13 +41,13 @@ def run(job: Job) -> None:
     sees_object = OBJECT[0].name in {part["name"] for part in about["layout"]["observation"]}
     references, layout = ReferenceLayer(robot, task.references, rg), observation_layout(robot, sees_object)
     require_layout(trained, about, {"observation": layout.describe()})
-    graph = ControllerGraph(student, robot, task, layout, int(about["architecture"]["history"]), references)
+    graph = ControllerGraph(student, robot, task, layout, references)
     sources = {stage: folder.name for stage, folder in job.inputs.items()} | {"export": job.key}
     statement = write_folder(job.out, graph, job.recipe, rg, sources)
     try:
         world = Specification(job.recipe, job.robot, rg).deployed
         policy, played = run_acceptance(world, partial(ExportedPolicy, job.out), job.interrupted)
-        by_torch = policy_of(student, about["architecture"])
+        by_torch = policy_of(student)
         _, expected = run_acceptance(world, lambda environment: by_torch, job.interrupted)
         steps = golden_inputs(world, job.out, job.interrupted)
     except Interrupted as stopped:

@@ -34,7 +34,7 @@ def run(job: Job) -> None:
     """Train robot and human; leave both policies, the exported skill, curves and the state of the training."""
     import torch
 
-    from iowbc.export.skill import write_skill
+    from iowbc.export.folder import write_skill
     from iowbc.learning.storage import save_network
     from iowbc.skill.game import ROBOT, TransportGame
     from iowbc.skill.learner import SkillTraining

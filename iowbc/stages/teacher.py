@@ -54,7 +54,8 @@ def run(job: Job) -> None:
     from iowbc.control.action import action_mirror
     from iowbc.evaluation.films import TrainingFilms
     from iowbc.learning.computing import prepare_process
-    from iowbc.learning.history_environments import HistoryEnvironments
+    from iowbc.learning.environments import HistoryEnvironments
+    from iowbc.learning.ppo import Learner
     from iowbc.learning.storage import save_network
     from iowbc.learning.teacher import TeacherTraining
     from iowbc.processes import available_cores
@@ -79,7 +80,7 @@ def run(job: Job) -> None:
         rows = environments
         if settings.history is not None:
             rows = HistoryEnvironments(environments, environments.layout.state.size, settings.history.length)
-        training = TeacherTraining(
+        learner = Learner(
             settings,
             rows,
             (environments.layout.mirror, action_mirror(load_robot(job.robot))),
@@ -87,9 +88,8 @@ def run(job: Job) -> None:
             cores=available_cores(),
             value_only=environments.layout.privileged_places(settings.value_only).tolist(),
             device=recipe.execution.device,
-            score=score,
-            say=job.report.say,
         )
+        training = TeacherTraining(learner, score, job.report.say)
         if START in job.inputs:
             _begin(training, environments, job.inputs[START])
         look = None if films is None else partial(_film, job, training, films)
@@ -147,7 +147,7 @@ def _film(job: Job, training: "TeacherTraining", films: "TrainingFilms") -> None
     from iowbc.learning.acting import policy_of
 
     path = films.due(training.steps, training.planned)
-    if path is not None and films.make(path, policy_of(*training.network()), job.report.say):
+    if path is not None and films.make(path, policy_of(training.network()[0]), job.report.say):
         job.report.files(path.parent)
 
 

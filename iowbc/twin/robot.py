@@ -1,17 +1,26 @@
-"""A MuJoCo robot controlled only by low-level commands, as the real one.
+"""A MuJoCo robot on the bus, controlled only by low-level commands as the real one, in real time or in lock step.
 
 The world is the recipe's, with its objects, sensors, delays and motor limits, at 1 kHz and with explicit PD control by
 the gains of each command.
 """
 
+import json
+import socket
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from iowbc.arrays import Array
-from iowbc.control.sensors import Measured
+from iowbc.control.sensors import Measured, quantities
+from iowbc.errors import UsageError
 from iowbc.onboard import messages
 from iowbc.onboard.checks import MODEL
 from iowbc.onboard.machine import FREQUENCY
 from iowbc.onboard.messages import Record
+from iowbc.onboard.process import PATIENCE, PERIOD
 from iowbc.recipe.simulation.randomization import LATENCIES
 from iowbc.recipe.simulation.simulation import SimulationSettings
 from iowbc.robot import rotations
@@ -20,15 +29,21 @@ from iowbc.sim.rendering.forces import Force
 from iowbc.sim.simulation import Simulation
 from iowbc.twin.support import HOOK, Support
 
+if TYPE_CHECKING:
+    from iowbc.onboard.dds import DdsBus
+
 TIMESTEP = 0.001
 """Physics step [s], and period of the motors' PD control."""
-
 SILENCE = 0.1
 """Time without commands after which the motors brake [s]; an assumption, since the drives' behaviour is not public."""
 CHARGE, WARM = 90, 35
 """Battery [%] and motor temperature [°C] of a twin."""
 LYING_HEIGHT, LYING_TILT = 0.35, 1.2
 """Pelvis height [m] below which, and tilt [rad] beyond which, the robot has fallen."""
+BATTERY_PERIODS = 250
+"""Bus periods between two battery states."""
+POSE_PERIODS = 5
+"""Bus periods between two poses: 100 Hz, as motion capture."""
 
 
 def at_bus_rate(recipe: SimulationSettings, control_frequency: float) -> SimulationSettings:
@@ -173,3 +188,46 @@ def low_state(tick: int, seen: Measured, torque: Array) -> Record:
     imu["gyroscope"], imu["accelerometer"] = seen.base_angular_velocity[0], -GRAVITY * gravity
     message["crc"] = messages.checksum(message)
     return message
+
+
+@contextmanager
+def object_tracking(port: int) -> Iterator[Callable[[Twin], None]]:
+    """Simulated motion capture, for `iowbc robot --object-pose`: a function that sends the measured pose of the object,
+    with the recipe's noise and latency, to a local port; call it after every period. Raises UsageError for port 0,
+    which is valid only for a listener."""
+    if port == 0:
+        raise UsageError("--object-pose udp:0: nothing can be sent there; give the port of `iowbc robot`")
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+
+        def send(twin: Twin) -> None:
+            if twin.periods % POSE_PERIODS == 0:
+                measured = twin.simulation.measured
+                seen = {name: getattr(measured, name)[0].tolist() for name in quantities(of_object=True)}
+                sender.sendto(json.dumps({"seen": seen}).encode(), ("127.0.0.1", port))
+
+        yield send
+
+
+def serve(
+    bus: "DdsBus", twin: Twin, going: Callable[[], bool], each: Callable[[Twin], None], *, lockstep: bool
+) -> None:
+    """Simulates the robot while `going`, and calls `each` after every period. In lock step, every state waits for its
+    command, as long as commands come."""
+    due, following = time.monotonic(), False
+    while going():
+        if twin.periods % BATTERY_PERIODS == 0:
+            bus.publish(twin.battery)
+        bus.publish(twin.state)
+        bus.answer_mode_requests()
+        if lockstep and following:
+            following = bus.wait(messages.LOW_COMMAND, PATIENCE)
+            due = time.monotonic()
+        else:
+            due = max(due + PERIOD, time.monotonic() - PATIENCE)
+            time.sleep(max(0.0, due - time.monotonic()))
+        commands = bus.take(messages.LOW_COMMAND)
+        following = following or bool(commands)
+        for command in commands:
+            twin.command(command)
+        twin.step()
+        each(twin)

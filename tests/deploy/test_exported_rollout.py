@@ -56,7 +56,7 @@ def driven(recipe: Recipe, robot: Robot, rg: Path, graph: ControllerGraph, expor
         planned_episode(scene, script, mass, 3, {}) for scene, mass in (("lift", 4.0), ("free", 0.0), ("push", 20.0))
     )
     environment = VectorEnv(Specification(recipe, robot.folder, rg), num_envs=3, workers=0, seed=0, episodes=episodes)
-    both = Both(ExportedPolicy(exported, environment, golden_steps=80), StudentPolicy(graph.student, graph.history))
+    both = Both(ExportedPolicy(exported, environment, golden_steps=80), StudentPolicy(graph.student))
     try:
         play_in(environment, both)
     finally:

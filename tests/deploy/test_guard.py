@@ -5,7 +5,7 @@ import logging
 import numpy as np
 import pytest
 
-from iowbc.deploy.guard import TargetGuard
+from iowbc.deploy.plausibility import TargetGuard
 
 LIMIT = np.array([10.0, 20.0])
 """Speed of two joints [rad/s]; in a period of 0.02 s they move by 0.2 and 0.4 rad."""

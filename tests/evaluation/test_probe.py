@@ -86,7 +86,7 @@ def rows(size: int, seed: int = 0) -> NDArray[np.float32]:
 def test_a_listener_leaves_the_policy_as_it_is_and_reads_its_latent() -> None:
     torch.manual_seed(0)
     network = StudentNetwork(6, 4, 2, 3, 5, [8], "elu", 10.0)
-    listener, alone = RecordingPolicy(StudentPolicy(network, 4), 3, 2, 25), StudentPolicy(network, 4)
+    listener, alone = RecordingPolicy(StudentPolicy(network), 3, 2, 25), StudentPolicy(network)
     for policy in (listener, alone):
         policy.reset(np.ones(3, np.bool_))
     for moment in range(5):

@@ -61,7 +61,7 @@ def student(graph: ControllerGraph, tmp_path_factory: pytest.TempPathFactory) ->
     folder.mkdir()
     architecture = {
         "observation": graph.layout.size,
-        "history": graph.history,
+        "history": graph.student.history,
         "actions": 15,
         "frame_features": 8,
         "latent": 8,

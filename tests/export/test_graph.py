@@ -18,8 +18,7 @@ from iowbc.deploy.controller import open_session, run
 from iowbc.deploy.exported_folder import SETTLE, STEP
 from iowbc.export.folder import write_folder
 from iowbc.export.golden import Values, largest_difference, stacked, write_golden
-from iowbc.export.graph import ControllerGraph
-from iowbc.export.onnx_graph import run_torch, write_onnx
+from iowbc.export.graph import ControllerGraph, run_torch, write_onnx
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot import rotations
 from iowbc.robot.description import Robot
@@ -72,7 +71,7 @@ def test_history_is_shifted_or_filled_with_the_first_observation(graph: Controll
     before = part(graph, inputs["state"], "history")
     following = part(graph, run_torch(graph.step, inputs)["state_next"], "history")
     assert np.array_equal(following[begun, :-1], before[begun, 1:])
-    assert np.array_equal(following[~begun], np.repeat(following[~begun, -1:], graph.history, axis=1))
+    assert np.array_equal(following[~begun], np.repeat(following[~begun, -1:], graph.student.history, axis=1))
 
 
 def test_the_action_is_the_students_for_that_history(graph: ControllerGraph, robot: Robot) -> None:

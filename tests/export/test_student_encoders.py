@@ -12,7 +12,7 @@ from iowbc.control.action import action_mirror
 from iowbc.control.observation import observation_layout
 from iowbc.deploy.controller import open_session, run
 from iowbc.export.golden import largest_difference
-from iowbc.export.onnx_graph import run_torch, write_onnx
+from iowbc.export.graph import run_torch, write_onnx
 from iowbc.learning.networks import StudentNetwork, mirror_as_json
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import Robot
@@ -25,7 +25,7 @@ def test_a_symmetric_student_is_exported_with_its_encoder(robot: Robot, recipe: 
     layout = observation_layout(robot, True)
     mirrors = [mirror_as_json(layout.mirror), mirror_as_json(action_mirror(robot))]
     student = StudentNetwork(layout.size, HISTORY, 15, 8, 8, [16, 8], "elu", 10.0, mirrors=mirrors)
-    graph = graph_of(student, HISTORY, recipe, robot, layout, None)
+    graph = graph_of(student, recipe, robot, layout, None)
     write_onnx(graph.step, tmp_path / "step.onnx", 18, {})
     inputs = random_inputs(graph, 5)
     theirs = run(open_session(tmp_path / "step.onnx"), inputs)

@@ -10,6 +10,7 @@ from point_masses import MIRRORS, PointMasses
 from iowbc.errors import StageFailed
 from iowbc.learning.acting import Policy, TeacherPolicy
 from iowbc.learning.networks import TeacherNetwork
+from iowbc.learning.ppo import Learner
 from iowbc.learning.teacher import TeacherTraining
 from iowbc.recipe.teacher import Check, Teacher
 
@@ -33,7 +34,7 @@ def training(scores: Scores | None, **changes: Any) -> tuple[TeacherTraining, li
     lines: list[str] = []
     settings = Teacher(environments=8, rollout=16, minibatches=2, hidden=(16,), check=CHECK)
     some = TeacherTraining(
-        settings.model_copy(update=changes), PointMasses(), MIRRORS, 3, score=scores, say=lines.append
+        Learner(settings.model_copy(update=changes), PointMasses(), MIRRORS, 3), score=scores, say=lines.append
     )
     return some, lines
 

@@ -4,8 +4,7 @@ import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 
-from iowbc.learning.curve_titles import title_of
-from iowbc.learning.curves import TABLE, Curves
+from iowbc.learning.curves import TABLE, Curves, title_of
 from iowbc.stages import distill, teacher
 
 

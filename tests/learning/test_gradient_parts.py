@@ -7,6 +7,7 @@ import torch
 from point_masses import MIRRORS, PointMasses
 
 from iowbc.learning.computing import ParallelBatch, reduced
+from iowbc.learning.ppo import Learner
 from iowbc.learning.teacher import TeacherTraining
 from iowbc.recipe.teacher import Teacher
 
@@ -27,7 +28,7 @@ def test_two_cores_work_at_the_same_time() -> None:
 def test_what_is_learnt_does_not_depend_on_the_cores() -> None:
     def learnt(cores: int) -> dict[str, Any]:
         settings = Teacher(environments=8, rollout=16, minibatches=2, hidden=(16,), parts=3)
-        training = TeacherTraining(settings, PointMasses(), MIRRORS, seed=3, cores=cores)
+        training = TeacherTraining(Learner(settings, PointMasses(), MIRRORS, seed=3, cores=cores))
         for _ in range(3):
             training.update()
         return training.arrays()
@@ -59,7 +60,7 @@ def test_threads_round_as_one_does_where_a_layer_is_used_twice() -> None:
 def test_a_graphics_card_learns_the_same() -> None:
     def learnt(device: str) -> dict[str, Any]:
         settings = Teacher(environments=8, rollout=16, minibatches=2, hidden=(16,), precision="float32")
-        training = TeacherTraining(settings, PointMasses(), MIRRORS, seed=3, device=device)
+        training = TeacherTraining(Learner(settings, PointMasses(), MIRRORS, seed=3, device=device))
         training.update()
         return training.arrays()
 

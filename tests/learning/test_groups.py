@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from iowbc.learning.advantages import drawn_leaders, without_common_part
+from iowbc.learning.rollout import drawn_leaders, without_common_part
 
 RANDOM = np.random.default_rng(0)
 

@@ -13,8 +13,9 @@ from point_masses import SETTINGS as POINT_MASSES
 from iowbc.learning.acting import StudentPolicy, policy_of, unfinished_policy
 from iowbc.learning.as_numpy import student_policy
 from iowbc.learning.checkpoint import save_checkpoint
-from iowbc.learning.history_environments import HistoryEnvironments
+from iowbc.learning.environments import HistoryEnvironments
 from iowbc.learning.networks import StudentNetwork
+from iowbc.learning.ppo import Learner
 from iowbc.learning.teacher import TeacherTraining
 from iowbc.recipe.teacher import HistoryNetwork, Teacher
 from iowbc.robot.mirror import MirrorMap
@@ -30,7 +31,7 @@ SETTINGS = POINT_MASSES.model_copy(update={"steps": 16 * 8 * 60, "history": NETW
 
 def training(**changes: Any) -> TeacherTraining:
     environments = HistoryEnvironments(PointMasses(), SEEN, LENGTH)
-    return TeacherTraining(SETTINGS.model_copy(update=changes), environments, MIRRORS, seed=3)
+    return TeacherTraining(Learner(SETTINGS.model_copy(update=changes), environments, MIRRORS, seed=3))
 
 
 def test_the_history_ends_with_the_newest_observation_and_an_episode_with_its_own() -> None:
@@ -93,7 +94,7 @@ def test_it_learns_and_a_resumed_training_is_the_unbroken_one_bit_for_bit(symmet
 def test_what_it_leaves_acts_as_it_trained_and_knows_nothing_privileged(symmetry: str) -> None:
     some = training(symmetry=symmetry)
     some.update()
-    network, architecture = some.network()
+    network, _ = some.network()
     rows = torch.from_numpy(np.random.default_rng(0).normal(size=(6, LENGTH * SEEN + 1)).astype(np.float32))
     histories = rows[:, : LENGTH * SEEN].reshape(6, LENGTH, SEEN)
     policy = some.model.policy
@@ -107,14 +108,14 @@ def test_what_it_leaves_acts_as_it_trained_and_knows_nothing_privileged(symmetry
             mirror = MirrorMap(MIRRORS[0].permutation[:SEEN], MIRRORS[0].sign[:SEEN])
             mirrored = network(mirror_tensor(mirror, histories))
             torch.testing.assert_close(mirrored, mirror_tensor(MIRRORS[1], network(histories)), rtol=0, atol=1e-6)
-    assert isinstance(policy_of(network, architecture), StudentPolicy)
+    assert isinstance(policy_of(network), StudentPolicy)
 
 
 def test_it_can_be_looked_at_while_it_trains(tmp_path: Path) -> None:
     some, path = training(), tmp_path / "training.checkpoint"
     some.update()
     save_checkpoint(path, "key", some.arrays())
-    shown, own = unfinished_policy(path, "key", SETTINGS, MIRRORS), policy_of(*some.network())
+    shown, own = unfinished_policy(path, "key", SETTINGS, MIRRORS), policy_of(some.network()[0])
     seen, none = np.random.default_rng(0).normal(size=(3, 5, SEEN)).astype(np.float32), np.zeros((5, 1), np.float32)
     for frame in seen:
         np.testing.assert_array_equal(shown.act(frame, none), own.act(frame, none))

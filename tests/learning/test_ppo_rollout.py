@@ -3,8 +3,8 @@ import math
 import numpy as np
 import torch
 
-from iowbc.learning.advantages import advantages
 from iowbc.learning.gaussian import divergence, entropy, exploration, log_density
+from iowbc.learning.rollout import advantages
 
 
 def column(*values: float) -> np.ndarray:

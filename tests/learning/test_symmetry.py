@@ -12,7 +12,7 @@ from iowbc.learning.networks import SymmetricMlp, TeacherNetwork, mirror_as_json
 from iowbc.learning.normalization import SymmetricMeanStd
 from iowbc.learning.perceptron import ACTIVATIONS
 from iowbc.learning.policy import ActorCritic
-from iowbc.learning.symmetric import MirrorBasis, PairedActivation, SymmetricLayers
+from iowbc.learning.symmetric import MirrorBasis, SymmetricLayers, activated_pairs
 from iowbc.robot.mirror import MirrorMap
 
 OBSERVATION = MirrorMap(np.array([1, 0, 2, 3, 5, 4]), np.array([1, 1, -1, 1, -1, -1], np.float32))
@@ -91,7 +91,7 @@ def test_the_gradient_of_paired_units_is_that_of_their_formula(activation: str) 
     one, other = function(even + odd), function(even - odd)
     weights = torch.randn(2, 5, 4)
     expected = torch.autograd.grad((weights[0] * (one + other) + weights[1] * (one - other)).sum(), (even, odd))
-    sums, differences = PairedActivation(activation)(even, odd)
+    sums, differences = activated_pairs(ACTIVATIONS[activation], even, odd)
     found = torch.autograd.grad((weights[0] * sums + weights[1] * differences).sum(), (even, odd))
     for a, b in zip(found, expected, strict=True):
         torch.testing.assert_close(a, b)

@@ -10,12 +10,13 @@ from stable_baselines3 import PPO
 
 from iowbc.learning import ppo
 from iowbc.learning.gaussian import log_density
+from iowbc.learning.ppo import Learner
 from iowbc.learning.teacher import TeacherTraining
 from iowbc.recipe.teacher import Restart, Teacher
 
 
 def training(**changes: Any) -> TeacherTraining:
-    return TeacherTraining(SETTINGS.model_copy(update=changes), PointMasses(), MIRRORS, seed=3)
+    return TeacherTraining(Learner(SETTINGS.model_copy(update=changes), PointMasses(), MIRRORS, seed=3))
 
 
 def finish(some: TeacherTraining) -> TeacherTraining:
@@ -61,7 +62,7 @@ class Lottery(PointMasses):
 
 @pytest.mark.parametrize(("task", "learnable"), [(PointMasses, True), (Lottery, False)])
 def test_the_gain_of_an_update_on_the_next_rollout_shows_whether_it_was_noise(task: Any, learnable: bool) -> None:
-    some = TeacherTraining(SETTINGS.model_copy(update={"steps": 16 * 8 * 60}), task(), MIRRORS, seed=3)
+    some = TeacherTraining(Learner(SETTINGS.model_copy(update={"steps": 16 * 8 * 60}), task(), MIRRORS, seed=3))
     figures = [some.update() for _ in range(60)]
     assert "train/gain" not in figures[0]
     gain = np.mean([one["train/gain"] for one in figures[1:]])
@@ -73,7 +74,7 @@ def test_the_gain_of_an_update_on_the_next_rollout_shows_whether_it_was_noise(ta
 @pytest.mark.parametrize("symmetry", ["construction", "none"])
 def test_what_the_value_alone_is_told_moves_no_action(symmetry: Any) -> None:
     settings = SETTINGS.model_copy(update={"symmetry": symmetry})
-    some = finish(TeacherTraining(settings, PointMasses(), MIRRORS, seed=3, value_only=[2]))
+    some = finish(TeacherTraining(Learner(settings, PointMasses(), MIRRORS, seed=3, value_only=[2])))
     network, _ = some.network()
     rows = torch.randn(20, 3)
     told = rows + torch.tensor([0.0, 0.0, 0.5])
@@ -111,7 +112,7 @@ def test_what_a_check_of_the_mean_finds_best_is_kept_as_it_was() -> None:
             "steps": 16 * 8 * 3,
         }
     )
-    some = TeacherTraining(settings, PointMasses(), MIRRORS, seed=3, score=lambda _: {"score": next(scores)})
+    some = TeacherTraining(Learner(settings, PointMasses(), MIRRORS, seed=3), score=lambda _: {"score": next(scores)})
     some.update()
     some.update()
     rows = torch.randn(20, 3)
@@ -154,7 +155,7 @@ def test_what_begins_from_a_trained_policy_lets_its_value_learn_first(symmetry: 
 
 def test_what_the_value_alone_is_told_is_hidden_from_a_policy_that_knew_it() -> None:
     given, _ = finish(training()).network()
-    some = TeacherTraining(SETTINGS, PointMasses(), MIRRORS, seed=3, value_only=[2])
+    some = TeacherTraining(Learner(SETTINGS, PointMasses(), MIRRORS, seed=3, value_only=[2]))
     some.begin(given)
     network, _ = some.network()
     rows = torch.randn(20, 3)

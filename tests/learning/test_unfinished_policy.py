@@ -9,6 +9,7 @@ from point_masses import MIRRORS, PointMasses
 from iowbc.errors import Damaged
 from iowbc.learning.acting import policy_of, unfinished_policy
 from iowbc.learning.checkpoint import save_checkpoint
+from iowbc.learning.ppo import Learner
 from iowbc.learning.teacher import TeacherTraining
 from iowbc.recipe.teacher import Teacher
 
@@ -20,12 +21,15 @@ def test_the_newest_whole_checkpoint_acts_as_the_training_does(tmp_path: Path, s
     settings = Teacher.model_validate(
         {"steps": 512, "environments": 8, "rollout": 16, "minibatches": 2, "hidden": [16], "symmetry": symmetry}
     )
-    training, path = TeacherTraining(settings, PointMasses(), MIRRORS, seed=3), tmp_path / "training.checkpoint"
+    training, path = (
+        TeacherTraining(Learner(settings, PointMasses(), MIRRORS, seed=3)),
+        tmp_path / "training.checkpoint",
+    )
     acting = []
     for _ in range(2):
         training.update()
         save_checkpoint(path, KEY, training.arrays())
-        acting.append(policy_of(*training.network()))
+        acting.append(policy_of(training.network()[0]))
     seen = np.random.default_rng(0).normal(size=(5, MIRRORS[0].sign.size)).astype(np.float32)
     none = np.zeros((5, 0), np.float32)
 

@@ -20,8 +20,7 @@ from iowbc.onboard.operators import Udp
 from iowbc.onboard.process import PERIOD
 from iowbc.onboard.ranges import Ranges
 from iowbc.sim.rendering.forces import Force
-from iowbc.twin.process import ObjectTracking
-from iowbc.twin.robot import SILENCE, Twin
+from iowbc.twin.robot import SILENCE, Twin, object_tracking
 from iowbc.twin.support import Support
 
 pytestmark = pytest.mark.integration
@@ -123,16 +122,15 @@ def test_a_policy_that_observes_the_object_carries_it_by_the_pose_that_the_robot
     simulation = exported_world(sighted).recipe.simulation
     twin = Twin(controller.robot, simulation, 50.0, "lift", 0, posture, Support("fixture", 0.2), fixed)
     poses = Udp(Ranges(controller.contract), 0)
-    tracking = ObjectTracking(poses.port)
     requests = {10: State.DAMPING, 20: State.STAND, 100: State.RUN}
-    for turn in range(1500):
-        now = turn * PERIOD
-        pose = poses.wanted(now, None)
-        wanted = OperatorRequest(standing, now, requests.get(turn), pose.seen, pose.seen_at)
-        twin.command(machine.turn(CycleInputs(now, (twin.state,), wanted)))
-        twin.step()
-        tracking.send(twin)
-    tracking.close()
+    with object_tracking(poses.port) as track:
+        for turn in range(1500):
+            now = turn * PERIOD
+            pose = poses.wanted(now, None)
+            wanted = OperatorRequest(standing, now, requests.get(turn), pose.seen, pose.seen_at)
+            twin.command(machine.turn(CycleInputs(now, (twin.state,), wanted)))
+            twin.step()
+            track(twin)
     poses.close()
     assert machine.state is State.RUN
     assert not twin.fallen
@@ -143,8 +141,8 @@ def test_a_policy_that_observes_the_object_carries_it_by_the_pose_that_the_robot
 
 
 def test_a_pose_cannot_be_sent_to_port_0() -> None:
-    with pytest.raises(UsageError, match="udp:0"):
-        ObjectTracking(0)
+    with pytest.raises(UsageError, match="udp:0"), object_tracking(0):
+        pass
 
 
 class View:

@@ -11,8 +11,8 @@ from iowbc.control.references import ReferenceLayer
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import Robot
 from iowbc.sim.simulation import Simulation
+from iowbc.skill.episodes import Plan
 from iowbc.skill.game import TransportGame
-from iowbc.skill.plan import Plan
 
 
 @pytest.mark.parametrize("force", [(25.0, 0.0, -10.0), (-15.0, 20.0, -30.0)])

@@ -13,11 +13,11 @@ from iowbc.errors import Interrupted, StageFailed
 from iowbc.learning.networks import TeacherNetwork
 from iowbc.recipe.skill.skill import SkillEvaluation
 from iowbc.results.table import markdown
+from iowbc.skill.episodes import Plan
 from iowbc.skill.evaluation.games import Competitor, planned_games, play_batches
 from iowbc.skill.evaluation.tables import COLUMNS, estimate, figure, headline, improvement, tables, worst_partner
 from iowbc.skill.game import TransportGame
 from iowbc.skill.lower_layer import Student
-from iowbc.skill.plan import Plan
 from iowbc.task.specification import Specification
 
 

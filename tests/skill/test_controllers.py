@@ -12,10 +12,10 @@ from iowbc.control.observation import observation_layout
 from iowbc.errors import StageFailed
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import load_robot
+from iowbc.skill.episodes import Plan
 from iowbc.skill.evaluation.games import on_controller
 from iowbc.skill.game import TransportGame
 from iowbc.skill.lower_layer import Student
-from iowbc.skill.plan import Plan
 from iowbc.task.specification import Specification
 
 BLIND = {"task.observation.observe_object": False}

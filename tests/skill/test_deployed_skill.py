@@ -16,14 +16,14 @@ from iowbc.deploy.exported_folder import exported_folder
 from iowbc.deploy.skill import CONTRACT, GOLDEN, GRAPH, Skill
 from iowbc.deploy.timing import step_seconds
 from iowbc.errors import ContractBroken
-from iowbc.export.skill import write_skill
+from iowbc.export.folder import write_skill
 from iowbc.learning.networks import TeacherNetwork
 from iowbc.recipe.reading.loading import load_recipe
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import robot_folder
+from iowbc.skill.episodes import Plan
 from iowbc.skill.game import TransportGame
 from iowbc.skill.lower_layer import load_student
-from iowbc.skill.plan import Plan
 from iowbc.task.specification import Specification
 
 ROOT = Path(__file__).parents[2]

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from iowbc.errors import UsageError
+from iowbc.skill.episodes import Plan
 from iowbc.skill.game import GameOutcome, TransportGame
-from iowbc.skill.plan import Plan
 
 Make = Callable[..., TransportGame]
 

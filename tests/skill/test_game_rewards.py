@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from iowbc.recipe.skill.skill import Skill
-from iowbc.skill.figures import internal_force
-from iowbc.skill.reward import GameEnding, ending, potential, reward
+from iowbc.skill.outcomes import GameEnding, ending, internal_force, potential, reward
 from iowbc.skill.situation import GameState
 
 N = 5

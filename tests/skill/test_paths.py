@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from iowbc.recipe.skill.task import Stretch
-from iowbc.skill.path import SPACING, Paths
+from iowbc.skill.situation import SPACING, Paths
 
 ARC = (Stretch(length=math.pi, turn=math.pi / 2.0, width=1.0), Stretch(length=1.0, rise=0.2))
 """A quarter of a circle of 2 m radius to the left, then 1 m on, which rises."""

@@ -13,11 +13,10 @@ from iowbc.arrays import Array
 from iowbc.errors import NoDisplay
 from iowbc.learning.networks import TeacherNetwork
 from iowbc.sim.rendering import appearance
+from iowbc.skill.episodes import Plan
 from iowbc.skill.game import HUMAN, ROBOT, TransportGame, play_once
 from iowbc.skill.lower_layer import Student
-from iowbc.skill.plan import Plan
-from iowbc.skill.playing import film_game, show_game
-from iowbc.skill.single_game import SingleGame
+from iowbc.skill.single_game import SingleGame, film_game, show_game
 from iowbc.task.specification import Specification
 
 PLAN = Plan("lift_doorway", "tugging", known=False, seed=3)

@@ -14,8 +14,8 @@ from iowbc.live.game import ROBOTS, GamePanel, GameSession
 from iowbc.live.page import SETTLED, Page
 from iowbc.live.server import serving
 from iowbc.sim.rendering import appearance
+from iowbc.skill.episodes import PERSON, Plan, Rule
 from iowbc.skill.lower_layer import Student
-from iowbc.skill.plan import PERSON, Plan, Rule
 from iowbc.task.specification import Specification
 
 ABOVE = np.array([-1.0, -1.5, 1.5])

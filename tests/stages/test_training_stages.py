@@ -306,7 +306,7 @@ def test_a_student_that_never_sees_the_object_begins_as_the_sighted_teacher_and_
     rows = torch.randn(20, layout.size)
     told = rows.clone()
     told[:, size:] = teacher_network.normalizer.mean[size:]
-    policy, again = (policy_of(network, about["architecture"]) for _ in range(2))
+    policy, again = (policy_of(network) for _ in range(2))
     action = policy.act(rows[:, : layout.state.size].numpy(), np.zeros((20, 0), np.float32))
     np.testing.assert_allclose(action, teacher_network(told).numpy(), atol=1e-5)
     rows[:, size:] += 5.0

@@ -22,7 +22,7 @@ from iowbc.errors import UsageError
 from iowbc.evaluation.exported import golden_inputs
 from iowbc.export import golden
 from iowbc.export.folder import write_folder
-from iowbc.export.onnx_graph import run_torch
+from iowbc.export.graph import run_torch
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import Robot
 from iowbc.task.specification import Specification

@@ -17,7 +17,7 @@ from iowbc.control.command import nominal_command
 from iowbc.control.sensors import Measured
 from iowbc.deploy.controller import Controller
 from iowbc.deploy.exported_folder import GOLDEN, exported_folder
-from iowbc.deploy.guard import JUMP, TargetGuard
+from iowbc.deploy.plausibility import JUMP, TargetGuard
 from iowbc.evaluation.exported import exported_world
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import Robot

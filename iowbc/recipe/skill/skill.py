@@ -85,7 +85,7 @@ class SkillLearning(PPO):
 
 
 Rival = Literal["nominal", "follow", "lead", "clock", "stand"]
-"""Rules of `iowbc.skill.plan.Plan` that act without a skill."""
+"""Rules of `iowbc.skill.episodes.Plan` that act without a skill."""
 
 
 PartnerKind = Literal[Behaviour, "agent"]

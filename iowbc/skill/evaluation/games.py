@@ -20,9 +20,9 @@ from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.skill.skill import Skill, SkillEvaluation
 from iowbc.recipe.task.task import Task
 from iowbc.robot.description import load_robot
+from iowbc.skill.episodes import AGENT, Plan, Rule
 from iowbc.skill.game import HUMAN, ROBOT, TransportGame, play_once
 from iowbc.skill.lower_layer import Student
-from iowbc.skill.plan import AGENT, Plan, Rule
 from iowbc.task.specification import Specification
 
 OF_CONTROLLER = ("control_frequency", "commands", "references", "action")
