@@ -26,7 +26,7 @@ def test_static_forces_on_the_hands_are_estimated_from_the_torques_of_the_arms(
     own = robot.interaction
     _, jacobian = references.arms.forward(position[:, own])
     pushed = np.concatenate([jacobian[0, side].T @ np.array(force) for side in range(2)])
-    gravity = hands._gravity.torque(position[:, own], position[:, robot.waist], down)[0]
+    gravity = references.arms.torque(position[:, own], position[:, robot.waist], down)[0]
     target = position.copy()
     target[0, own] += (gravity - pushed) / robot.kp[own]
     hands.add(target, position, np.zeros_like(position))
