@@ -14,9 +14,7 @@ from iowbc.arrays import Array
 from iowbc.recipe.evaluation.model_based import ModelBased
 from iowbc.recipe.generator import PostureProblem
 from iowbc.reference.labels.gauss_newton import UNBOUNDED, constrained_step
-from iowbc.reference.labels.sample import Sample
-from iowbc.reference.labels.soles import sole_limits
-from iowbc.reference.labels.support_model import SupportModel
+from iowbc.reference.labels.support_model import Sample, SupportModel, sole_limits
 from iowbc.robot.description import Robot
 
 LIMITS = ("friction", "sole_fraction", "smallest_load", "limit_margin", "effort_fraction")

@@ -15,7 +15,7 @@ import numpy as np
 
 from iowbc.errors import Rejected
 from iowbc.recipe.recipe import Recipe
-from iowbc.reference.labels.sample import Sample
+from iowbc.reference.labels.support_model import Sample
 
 SMALL: dict[str, Any] = {
     "sampling": {"samples": 400, "mirrored_share": 0.1},

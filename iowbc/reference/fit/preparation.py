@@ -11,8 +11,7 @@ from iowbc.recipe.generator import ReferenceGenerator
 from iowbc.reference.fit.fitting import FitData
 from iowbc.reference.fit.task_error import TaskKinematics
 from iowbc.reference.labels.dataset import Dataset
-from iowbc.reference.labels.sample import Sample
-from iowbc.reference.labels.support_model import SupportModel
+from iowbc.reference.labels.support_model import Sample, SupportModel
 from iowbc.robot.description import Robot
 from iowbc.robot.mirror import interaction_mirror, support_mirror
 

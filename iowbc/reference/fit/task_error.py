@@ -7,9 +7,7 @@ import numpy as np
 import pinocchio
 
 from iowbc.arrays import Array
-from iowbc.reference.labels.sample import Sample
-from iowbc.reference.labels.soles import support_edges, support_margin
-from iowbc.reference.labels.support_model import SupportModel
+from iowbc.reference.labels.support_model import Sample, SupportModel, support_edges, support_margin
 
 ROWS = 10
 """Foot position 3, foot rotation 3, height 1, torso rotation 3."""

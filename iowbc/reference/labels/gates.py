@@ -10,9 +10,15 @@ import pinocchio
 from iowbc.arrays import Array
 from iowbc.errors import Rejected
 from iowbc.recipe.generator import LabelGates
-from iowbc.reference.labels.sample import Posture, Sample
-from iowbc.reference.labels.soles import sole_limits, support_edges, support_margin
-from iowbc.reference.labels.support_model import SupportModel, ground_forces
+from iowbc.reference.labels.support_model import (
+    Posture,
+    Sample,
+    SupportModel,
+    ground_forces,
+    sole_limits,
+    support_edges,
+    support_margin,
+)
 from iowbc.robot.description import Robot
 from iowbc.robot.mjcf import Capsule
 

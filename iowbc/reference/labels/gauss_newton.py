@@ -8,8 +8,7 @@ import pinocchio
 
 from iowbc.arrays import Array
 from iowbc.errors import Rejected
-from iowbc.reference.labels.sample import Sample
-from iowbc.reference.labels.support_model import SupportModel, posture_weights
+from iowbc.reference.labels.support_model import Sample, SupportModel, posture_weights
 
 REGULARISATION = 1e-9
 """Added to the reduced Hessian, relative to its largest entry: the QP solver needs it positive definite."""

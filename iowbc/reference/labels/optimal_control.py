@@ -14,9 +14,7 @@ from iowbc.arrays import Array
 from iowbc.errors import Rejected
 from iowbc.recipe.generator import ReferenceGenerator
 from iowbc.reference.labels.gauss_newton import UNBOUNDED, constrained_step, kinematic_start
-from iowbc.reference.labels.sample import Posture, Sample
-from iowbc.reference.labels.soles import SoleLimits, sole_limits
-from iowbc.reference.labels.support_model import SupportModel, posture_weights
+from iowbc.reference.labels.support_model import Posture, Sample, SoleLimits, SupportModel, posture_weights, sole_limits
 
 STOP = 1e-10
 """Expected improvement at which the solver stops; crocoddyl's 5e-5 leaves flat postures where they started."""

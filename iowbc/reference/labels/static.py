@@ -10,9 +10,7 @@ import pinocchio
 from iowbc.arrays import Array
 from iowbc.errors import Rejected
 from iowbc.reference.labels.gauss_newton import UNBOUNDED, PostureCost, constrained_step, cost_weights
-from iowbc.reference.labels.sample import Posture, Sample
-from iowbc.reference.labels.soles import sole_limits
-from iowbc.reference.labels.support_model import SupportModel, ground_forces
+from iowbc.reference.labels.support_model import Posture, Sample, SupportModel, ground_forces, sole_limits
 from iowbc.robot.description import GRAVITY
 
 

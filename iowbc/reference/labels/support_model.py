@@ -1,19 +1,56 @@
-"""The robot in pinocchio, with its arms locked to a sample."""
+"""The robot on two soles in pinocchio, with its arms locked to a sample; limits of the soles."""
 
+from dataclasses import dataclass
+from itertools import product
 from typing import Any, Literal
 
 import numpy as np
 import pinocchio
+from scipy.spatial import ConvexHull
 
 from iowbc.arrays import Array
 from iowbc.recipe.generator import PostureProblem
-from iowbc.reference.labels.sample import Sample
+from iowbc.robot import rotations
 from iowbc.robot.description import Robot
 
 BASE_RANGE = 10.0
 """Bound on the floating base's position [m]; pinocchio's reader sets ±1.01, which optimisers take for a limit."""
 ROOT = "root_joint"
 """Name that crocoddyl's floating-base actuation looks for."""
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One arm posture and base command."""
+
+    arm: Array
+    """Positions of the interaction branch, shape (14,) [rad]."""
+    command: Array
+    """Height [m] and torso pitch [rad], shape (2,)."""
+
+    @property
+    def height(self) -> float:
+        """Commanded height [m]."""
+        return float(self.command[0])
+
+    def torso_rotation(self) -> Array:
+        """Commanded torso orientation relative to the feet: a pitch about the lateral axis, shape (3, 3)."""
+        return rotations.matrix(rotations.from_euler(np.zeros(()), self.command[1], np.zeros(())))
+
+
+@dataclass(frozen=True)
+class Posture:
+    """A support posture in equilibrium on two soles."""
+
+    configuration: Array
+    """Reduced pinocchio configuration: base position, base quaternion xyzw, support joints, shape (22,)."""
+    wrench: Array
+    """Wrench of the ground on each sole in the sole's frame, force then moment, shape (2, 6) [N, N·m]."""
+
+    @property
+    def support(self) -> Array:
+        """Support joint positions, shape (15,) [rad]."""
+        return self.configuration[7:]
 
 
 def mean_stance(width: float) -> Array:
@@ -119,3 +156,52 @@ def posture_weights(robot: Robot, problem: PostureProblem) -> Array:
     weights[robot.lateral] = problem.lateral_weight
     weights[robot.waist] = problem.waist_weight
     return weights
+
+
+@dataclass(frozen=True)
+class SoleLimits:
+    """Limits of one flat sole: friction pyramid, centre of pressure in a rectangle, torsion, least load."""
+
+    friction: float
+    half_length: float
+    half_width: float
+    """Half sides of the rectangle for the centre of pressure [m]."""
+    smallest_load: float
+    """Least normal force [N]."""
+
+    def rows(self) -> tuple[Array, Array]:
+        """A and b of A f ≤ b for a wrench f (force, moment) in the sole's frame, shapes (17, 6) and (17,).
+
+        The friction coefficient is that of the pyramid inside the cone, μ/√2. The yaw rows bound the torsion that four
+        corner forces inside that pyramid can make (Caron, Pham, Nakamura, ICRA 2015).
+        """
+        x, y, mu = self.half_length, self.half_width, self.friction / np.sqrt(2.0)
+        pyramid = [[1, 0, -mu, 0, 0, 0], [-1, 0, -mu, 0, 0, 0], [0, 1, -mu, 0, 0, 0], [0, -1, -mu, 0, 0, 0]]
+        pressure = [[0, 0, -y, 1, 0, 0], [0, 0, -y, -1, 0, 0], [0, 0, -x, 0, 1, 0], [0, 0, -x, 0, -1, 0]]
+        torsion = [
+            [a * y, b * x, -mu * (x + y), -turn * a * mu, -turn * b * mu, -turn]
+            for turn, a, b in product((1.0, -1.0), repeat=3)
+        ]
+        rows = np.array([*pyramid, *pressure, *torsion, [0, 0, -1, 0, 0, 0]], dtype=np.float64)
+        bound = np.zeros(len(rows))
+        bound[-1] = -self.smallest_load
+        return rows, bound
+
+
+def sole_limits(robot: Robot, problem: PostureProblem) -> SoleLimits:
+    """Limits of both soles: the rectangle inside the contact points, shrunk by the recipe."""
+    half_length, half_width = problem.sole_fraction * np.abs(robot.sole_polygon).min(axis=(0, 1))
+    return SoleLimits(problem.friction, float(half_length), float(half_width), problem.smallest_load)
+
+
+def support_edges(robot: Robot, problem: PostureProblem) -> tuple[Array, Array]:
+    """Inward normals n (edges, 2) and offsets d (edges,) [m] of both soles' convex hull: distance inside is n·p + d."""
+    corners = robot.sole_polygon + mean_stance(problem.stance_width)[:, None, :2]
+    equations = np.unique(ConvexHull(corners.reshape(-1, 2)).equations.round(12), axis=0)
+    return -equations[:, :2], -equations[:, 2]
+
+
+def support_margin(edges: tuple[Array, Array], point: Array) -> Array:
+    """Distance of points (..., 2) to the nearest edge, positive inside [m]."""
+    normals, offsets = edges
+    return (point @ normals.T + offsets).min(axis=-1)

@@ -17,9 +17,8 @@ from iowbc.reference.fit.gates import check_fit, measure_jumps
 from iowbc.reference.fit.preparation import split_by_group
 from iowbc.reference.fit.task_error import TaskErrors, TaskKinematics
 from iowbc.reference.labels.dataset import Dataset
-from iowbc.reference.labels.sample import Sample
 from iowbc.reference.labels.static import StaticMethod
-from iowbc.reference.labels.support_model import SupportModel
+from iowbc.reference.labels.support_model import Sample, SupportModel
 
 
 def toy(count: int, seed: int) -> FitData:

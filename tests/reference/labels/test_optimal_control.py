@@ -14,11 +14,9 @@ from iowbc.reference.labels.gates import LabelChecker
 from iowbc.reference.labels.gauss_newton import kinematic_start
 from iowbc.reference.labels.optimal_control import OptimalControlMethod, distribute
 from iowbc.reference.labels.plan import SamplePlan
-from iowbc.reference.labels.sample import Sample
 from iowbc.reference.labels.shards import Shard
-from iowbc.reference.labels.soles import sole_limits
 from iowbc.reference.labels.static import StaticMethod
-from iowbc.reference.labels.support_model import SupportModel
+from iowbc.reference.labels.support_model import Sample, SupportModel, sole_limits
 from iowbc.robot.description import Robot
 
 COMMANDS = ((0.70, 0.0), (0.60, 0.4), (0.66, -0.2), (0.68, 0.9))

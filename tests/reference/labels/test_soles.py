@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from iowbc.recipe.generator import ReferenceGenerator
-from iowbc.reference.labels.soles import SoleLimits, support_edges, support_margin
+from iowbc.reference.labels.support_model import SoleLimits, support_edges, support_margin
 from iowbc.robot.description import Robot
 
 LIMITS = SoleLimits(friction=0.5 * np.sqrt(2.0), half_length=0.1, half_width=0.03, smallest_load=20.0)
