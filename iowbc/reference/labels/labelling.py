@@ -9,8 +9,8 @@ import numpy as np
 from iowbc.arrays import Array
 from iowbc.recipe.generator import ReferenceGenerator
 from iowbc.reference.labels.gates import LabelChecker
+from iowbc.reference.labels.gauss_newton import StaticMethod
 from iowbc.reference.labels.plan import SamplePlan
-from iowbc.reference.labels.static import StaticMethod
 from iowbc.reference.labels.support_model import Sample, SupportModel
 from iowbc.robot.description import load_robot
 

@@ -13,7 +13,7 @@ import pinocchio
 from iowbc.arrays import Array
 from iowbc.errors import Rejected
 from iowbc.recipe.generator import ReferenceGenerator
-from iowbc.reference.labels.gauss_newton import UNBOUNDED, constrained_step, kinematic_start
+from iowbc.reference.labels.gauss_newton import UNBOUNDED, PostureCost, constrained_step, cost_weights
 from iowbc.reference.labels.support_model import Posture, Sample, SoleLimits, SupportModel, posture_weights, sole_limits
 
 STOP = 1e-10
@@ -115,6 +115,24 @@ class OptimalControlMethod:
             wrench = crocoddyl.ResidualModelContactWrenchCone(state, sole, cone, nu)
             limit(f"wrench of sole {sole}", wrench, cone.lb, cone.ub, self.ocp.cone_weight)
         return costs
+
+
+def kinematic_start(support: SupportModel, sample: Sample) -> Array:
+    """Configuration (22,) with the feet in place, the centre of mass over their middle, height and torso as commanded,
+    near the default posture, by Gauss-Newton steps on the cost without torques, with the feet as linearised equalities
+    and the joint ranges. The support model must be locked to the sample. Raises `Rejected` if the feet cannot stay."""
+    problem, weight = support.problem, np.concatenate(cost_weights(support))
+    q, largest = support.rest(sample), problem.largest_step
+    rest = q[7:].copy()
+    for _ in range(problem.iterations):
+        cost = PostureCost.at(support, q, sample, rest)
+        gradient, residual = weight[:, None] * cost.gradient, weight * cost.residual
+        lower, upper = np.maximum(support.lower - q[7:], -largest), np.minimum(support.upper - q[7:], largest)
+        step = constrained_step(gradient, residual, cost.equality, cost.error, cost.gradient[6:], lower, upper)
+        q = pinocchio.integrate(support.model, q, step)
+        if np.abs(step).max() < problem.tolerance:
+            break
+    return q
 
 
 def distribute(support: SupportModel, configuration: Array, limits: SoleLimits) -> Array:

@@ -17,7 +17,7 @@ from iowbc.reference.fit.gates import check_fit, measure_jumps
 from iowbc.reference.fit.preparation import split_by_group
 from iowbc.reference.fit.task_error import TaskErrors, TaskKinematics
 from iowbc.reference.labels.dataset import Dataset
-from iowbc.reference.labels.static import StaticMethod
+from iowbc.reference.labels.gauss_newton import StaticMethod
 from iowbc.reference.labels.support_model import Sample, SupportModel
 
 

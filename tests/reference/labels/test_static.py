@@ -12,7 +12,7 @@ from iowbc.errors import Rejected
 from iowbc.pipeline.stage import Job
 from iowbc.recipe.generator import PostureProblem, ReferenceGenerator
 from iowbc.reference.labels.dataset import Dataset
-from iowbc.reference.labels.static import StaticMethod
+from iowbc.reference.labels.gauss_newton import StaticMethod
 from iowbc.reference.labels.support_model import Posture, Sample, SupportModel, ground_forces, posture_weights
 from iowbc.robot.description import Robot
 from iowbc.robot.mirror import interaction_mirror, support_mirror
