@@ -27,8 +27,7 @@ from iowbc.pipeline.store.digests import folder_files
 from iowbc.recipe.evaluation.sequences import Segment
 from iowbc.recipe.reading.loading import load_recipe
 from iowbc.recipe.recipe import Recipe
-from iowbc.reference.labels.labelling import LabelTask
-from iowbc.reference.labels.pool import label_all
+from iowbc.reference.labels.pool import LabelTask, label_all
 from iowbc.robot.description import load_robot, robot_folder
 from iowbc.rollouts.blocks import block_size
 from iowbc.rollouts.rollout_policies import ExploringPolicy

@@ -13,9 +13,8 @@ def run(job: Job) -> None:
 
     from iowbc.control.feasible_map import FeasibleMap
     from iowbc.control.generator import ReferenceNetwork
-    from iowbc.reference.fit.fitting import fit
+    from iowbc.reference.fit.fitting import fit, prepare
     from iowbc.reference.fit.gates import check_fit, measure_jumps
-    from iowbc.reference.fit.preparation import prepare
     from iowbc.reference.labels.dataset import Dataset
     from iowbc.reference.labels.plan import SamplePlan
     from iowbc.reference.pictures.figures import error_figures, gentle_figure, learning_figure

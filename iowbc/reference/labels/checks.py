@@ -6,9 +6,8 @@ import numpy as np
 
 from iowbc.arrays import Array
 from iowbc.recipe.generator import ReferenceGenerator
-from iowbc.reference.labels.dataset import Dataset
+from iowbc.reference.labels.dataset import Dataset, Shard
 from iowbc.reference.labels.plan import SamplePlan
-from iowbc.reference.labels.shards import Shard
 from iowbc.robot.mirror import support_mirror
 
 WORST = 5

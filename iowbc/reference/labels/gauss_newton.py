@@ -1,4 +1,4 @@
-"""Gauss-Newton steps under constraints: a step, the linearised cost of a posture, and the static method of labelling."""
+"""Gauss-Newton steps under constraints: a step, linearised cost of a posture, and the static method of labelling."""
 
 from dataclasses import dataclass
 
@@ -91,7 +91,7 @@ def cost_weights(support: SupportModel) -> tuple[Array, Array]:
 
 
 class StaticMethod:
-    """The steady state of the optimal control problem (paper eq. 4): the least-torque posture in equilibrium on two soles.
+    """The steady state of the optimal control problem (paper eq. 4): a posture in equilibrium with the least torque.
 
     Variables are the base pose, the support joints and the two sole wrenches; Gauss-Newton steps with the feet and the
     base's equilibrium as linearised equalities, and joint, torque and contact limits as inequalities. Solves samples

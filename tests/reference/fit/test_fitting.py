@@ -12,9 +12,8 @@ from iowbc.control.generator import ReferenceNetwork
 from iowbc.errors import Interrupted
 from iowbc.pipeline.stage import Job
 from iowbc.recipe.generator import Fit, FitGates, ReferenceGenerator, SmoothnessCheck
-from iowbc.reference.fit.fitting import FitData, fit
+from iowbc.reference.fit.fitting import FitData, fit, split_by_group
 from iowbc.reference.fit.gates import check_fit, measure_jumps
-from iowbc.reference.fit.preparation import split_by_group
 from iowbc.reference.fit.task_error import TaskErrors, TaskKinematics
 from iowbc.reference.labels.dataset import Dataset
 from iowbc.reference.labels.gauss_newton import StaticMethod

@@ -9,12 +9,11 @@ import pytest
 from iowbc.pipeline.stage import Job
 from iowbc.recipe.generator import LabelGates, PostureProblem, ReferenceGenerator
 from iowbc.reference.labels.checks import chosen_for_crosscheck, compare_methods
-from iowbc.reference.labels.dataset import Dataset
+from iowbc.reference.labels.dataset import Dataset, Shard
 from iowbc.reference.labels.gates import LabelChecker
 from iowbc.reference.labels.gauss_newton import StaticMethod
 from iowbc.reference.labels.optimal_control import OptimalControlMethod, distribute, kinematic_start
 from iowbc.reference.labels.plan import SamplePlan
-from iowbc.reference.labels.shards import Shard
 from iowbc.reference.labels.support_model import Sample, SupportModel, sole_limits
 from iowbc.robot.description import Robot
 
