@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio
 
 from iowbc.arrays import Array
-from iowbc.recipe.evaluation.model_based import ModelBased
+from iowbc.recipe.evaluation.baselines import ModelBased
 from iowbc.recipe.generator import PostureProblem
 from iowbc.reference.labels.gauss_newton import UNBOUNDED, constrained_step
 from iowbc.reference.labels.support_model import Sample, SupportModel, sole_limits

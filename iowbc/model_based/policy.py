@@ -10,7 +10,7 @@ from iowbc.control.command import HEIGHT, PITCH
 from iowbc.control.observation import observation_layout
 from iowbc.errors import Rejected
 from iowbc.model_based.balance import Balance
-from iowbc.recipe.evaluation.model_based import Estimation
+from iowbc.recipe.evaluation.baselines import Estimation
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import Robot
 

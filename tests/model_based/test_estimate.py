@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from iowbc.model_based.policy import Motion, motion_gains
-from iowbc.recipe.evaluation.model_based import Estimation
+from iowbc.recipe.evaluation.baselines import Estimation
 
 PERIOD, JOINTS = 0.02, 2
 UPRIGHT = np.array([0.0, 0.0, -1.0])
