@@ -53,6 +53,13 @@ IMPLICIT = (
     ),
 )
 """Unquoted scalars that are not text: tag, pattern, and possible first characters."""
+CONVERSIONS: dict[str, Callable[[str], Scalar]] = {
+    _NULL: lambda text: None,
+    _BOOL: lambda text: text.lower() == "true",
+    _INT: lambda text: int(text, 0 if text[:2] in ("0o", "0x") else 10),
+    _FLOAT: lambda text: float(text.lower().replace(".inf", "inf").replace(".nan", "nan")),
+}
+"""Values of these scalars, by tag."""
 for _tag, _pattern, _first in IMPLICIT:
     _Loader.add_implicit_resolver(_tag, _pattern, _first)
 
@@ -139,18 +146,10 @@ class _Builder:
             self._complain(node, f"{shown(text)} has {len(text):,} characters; no number of a recipe has so many")
             return None
         try:
-            if node.tag == _NULL:
-                return None
-            if node.tag == _BOOL:
-                return text.lower() == "true"
-            if node.tag == _INT:
-                return int(text, 0) if text[:2] in ("0o", "0x") else int(text)
-            if node.tag == _FLOAT:
-                return float(text.lower().replace(".inf", "inf").replace(".nan", "nan"))
+            return CONVERSIONS.get(node.tag, str)(text)
         except ValueError:
             self._complain(node, f"{shown(text)} is not a {node.tag.split(':')[-1]}")
             return None
-        return text
 
     def _complain(self, node: yaml.Node, text: str) -> None:
         self.problems.append(Problem(self.place_of(node.start_mark), text))
