@@ -14,7 +14,7 @@ import torch
 from iowbc.arrays import Array, Indices
 from iowbc.errors import Interrupted
 from iowbc.recipe.generator import Fit, ReferenceGenerator
-from iowbc.reference.fit.task_error import LENGTH_ROWS, ROWS, TaskKinematics
+from iowbc.reference.fit.errors import LENGTH_ROWS, ROWS, task_jacobian
 from iowbc.reference.labels.dataset import Dataset
 from iowbc.reference.labels.support_model import Sample, SupportModel
 from iowbc.robot.description import Robot
@@ -46,20 +46,20 @@ class Prepared:
     """Rows of the dataset kept for the gates."""
     samples: list[Sample]
     """All rows as samples."""
-    kinematics: TaskKinematics
+    support: SupportModel
 
 
 def prepare(
     dataset: Dataset, robot: Robot, recipe: ReferenceGenerator, seed: int, interrupted: Callable[[], bool]
 ) -> Prepared:
     """Splits by group and adds mirror images to the training part. Raises `Interrupted`."""
-    kinematics = TaskKinematics(SupportModel(robot, recipe.problem, recipe.height))
+    support = SupportModel(robot, recipe.problem, recipe.height)
     samples = [Sample(*row) for row in zip(dataset.arm, dataset.command, strict=True)]
     orientation = np.roll(dataset.base_quaternion, -1, axis=1)
     configuration = np.concatenate([dataset.base_position, orientation, dataset.support], axis=1)
     jacobian = np.empty((len(dataset), 10, len(robot.support)), dtype=np.float32)
     for row, (sample, q) in enumerate(zip(samples, configuration, strict=True)):
-        jacobian[row] = kinematics.jacobian(sample, q)
+        jacobian[row] = task_jacobian(support, sample, q)
         if row % 1000 == 0 and interrupted():
             raise Interrupted
     train, validation, held_out = split_by_group(dataset.group, recipe.fit.validation, recipe.fit.held_out, seed)
@@ -70,7 +70,7 @@ def prepare(
         inputs = np.concatenate([arms(dataset.arm[train]), dataset.command[train]], axis=1)
         image = FitData(inputs, legs(dataset.support[train]), legs(jacobian[train]))
         learnt = FitData(*map(np.concatenate, zip(learnt, image, strict=True)))
-    return Prepared(learnt, checked, train, held_out, samples, kinematics)
+    return Prepared(learnt, checked, train, held_out, samples, support)
 
 
 def split_by_group(group: Array, validation: float, held_out: float, seed: int) -> tuple[Indices, Indices, Indices]:

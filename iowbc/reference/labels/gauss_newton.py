@@ -8,14 +8,7 @@ import pinocchio
 
 from iowbc.arrays import Array
 from iowbc.errors import Rejected
-from iowbc.reference.labels.support_model import (
-    Posture,
-    Sample,
-    SupportModel,
-    ground_forces,
-    posture_weights,
-    sole_limits,
-)
+from iowbc.reference.labels.support_model import Posture, Sample, SupportModel, ground_forces
 from iowbc.robot.description import GRAVITY
 
 REGULARISATION = 1e-9
@@ -87,7 +80,7 @@ def cost_weights(support: SupportModel) -> tuple[Array, Array]:
     """Square roots of the weights of the residual: task (6,) and posture (15,)."""
     problem = support.problem
     task = [problem.com_weight] * 2 + [problem.height_weight] + [problem.torso_weight] * 3
-    return np.sqrt(task), np.sqrt(posture_weights(support.robot, problem))
+    return np.sqrt(task), np.sqrt(support.posture_weights)
 
 
 class StaticMethod:
@@ -106,7 +99,7 @@ class StaticMethod:
         task, posture = cost_weights(support)
         torque = np.sqrt(np.full(self.joints, support.problem.torque_weight))
         self.root_weight = np.concatenate([task, torque, posture])
-        cone, bound = sole_limits(support.robot, support.problem).rows()
+        cone, bound = support.limits.rows()
         self.cone, self.cone_bound = np.kron(np.eye(2), cone), np.tile(bound, 2)
         self.angle_rows = np.eye(self.joints, self.size, 6)
         self.cone_rows = np.concatenate([np.zeros((len(self.cone), self.velocities)), self.cone], axis=1)

@@ -22,8 +22,8 @@ from iowbc.arrays import Array
 from iowbc.errors import Interrupted, Rejected, WorkerFailed
 from iowbc.processes import die_with_parent, single_threaded
 from iowbc.recipe.generator import ReferenceGenerator
+from iowbc.reference.labels.checks import LabelChecker
 from iowbc.reference.labels.dataset import Shard, merge, read_shard, write_shard
-from iowbc.reference.labels.gates import LabelChecker
 from iowbc.reference.labels.gauss_newton import StaticMethod
 from iowbc.reference.labels.plan import SamplePlan
 from iowbc.reference.labels.support_model import Sample, SupportModel

@@ -53,11 +53,6 @@ class Posture:
         return self.configuration[7:]
 
 
-def mean_stance(width: float) -> Array:
-    """Places of the sole centres on the ground, left and right, shape (2, 3) [m]."""
-    return np.array([[0.0, 0.5 * width, 0.0], [0.0, -0.5 * width, 0.0]])
-
-
 def build_model(robot: Robot) -> Any:
     """A `pinocchio.Model` in MuJoCo's joint order (nq 7 + joints, nv 6 + joints), with armature and limits."""
     model = pinocchio.buildModelFromMJCF(str(robot.mjcf))
@@ -75,87 +70,6 @@ def build_model(robot: Robot) -> Any:
     model.lowerPositionLimit = np.concatenate([np.full(3, -BASE_RANGE), np.full(4, -1.01), robot.lower])
     model.upperPositionLimit = np.concatenate([np.full(3, BASE_RANGE), np.full(4, 1.01), robot.upper])
     return model
-
-
-class SupportModel:
-    """Base and support joints in the robot's order; `lock` adds the arms' inertia."""
-
-    def __init__(self, robot: Robot, problem: PostureProblem, height: Literal["pelvis", "com"] = "pelvis") -> None:
-        """`height`: that of the pelvis or of the centre of mass, as a sample commands it."""
-        self.robot, self.problem, self.height = robot, problem, height
-        self.full = build_model(robot)
-        self.full_data = self.full.createData()
-        self._arms = [self.full.getJointId(robot.joints[index]) for index in robot.interaction]
-        self._neutral = pinocchio.neutral(self.full)
-        self.model = pinocchio.buildReducedModel(self.full, self._arms, self._neutral)
-        expected = [robot.joints[index] for index in robot.support]
-        if list(self.model.names)[2:] != expected:
-            raise ValueError(
-                f"{robot.folder}: the support joints must stand in the MJCF's order: {self.model.names[2:]}"
-            )
-        self.data = self.model.createData()
-        self.soles = [self.model.getFrameId(site) for site in robot.soles]
-        self.torso = self.model.getFrameId(robot.torso)
-        self.base = self.model.getFrameId(robot.base)
-        self._torso_joint = int(self.model.frames[self.torso].parentJoint)
-        self._full_torso = self.full.getJointId(self.model.names[self._torso_joint])
-        self.stance = [pinocchio.SE3(np.eye(3), place) for place in mean_stance(problem.stance_width)]
-        margin = problem.limit_margin
-        self.lower, self.upper = robot.lower[robot.support] + margin, robot.upper[robot.support] - margin
-        self.effort = problem.effort_fraction * robot.effort[robot.support]
-
-    def lock(self, sample: Sample) -> None:
-        """Adds the inertia of the arms in their posture to the torso."""
-        q = self._neutral.copy()
-        q[7 + self.robot.interaction] = sample.arm
-        pinocchio.forwardKinematics(self.full, self.full_data, q)
-        torso = self.full_data.oMi[self._full_torso]
-        inertia = self.full.inertias[self._full_torso].copy()
-        for joint in self._arms:
-            inertia += torso.actInv(self.full_data.oMi[joint]).act(self.full.inertias[joint])
-        self.model.inertias[self._torso_joint] = inertia
-
-    def whole(self, configuration: Array, arm: Array) -> Array:
-        """Configuration of the full model (36,) from the reduced one (22,) and the arms (14,)."""
-        q = np.empty(self.full.nq)
-        q[:7] = configuration[:7]
-        q[7 + self.robot.support] = configuration[7:]
-        q[7 + self.robot.interaction] = arm
-        return q
-
-    def start(self) -> Array:
-        """The default posture with the soles in their places, shape (22,)."""
-        q: Array = pinocchio.neutral(self.model)
-        q[7:] = self.robot.default_position[self.robot.support]
-        pinocchio.framesForwardKinematics(self.model, self.data, q)
-        soles = [self.data.oMf[sole].translation for sole in self.soles]
-        q[:3] = -0.5 * (soles[0] + soles[1])
-        return q
-
-    def rest(self, sample: Sample) -> Array:
-        """Reference of the posture cost, (22,): default posture, with part of the commanded pitch in the waist."""
-        q = self.start()
-        waist = self.robot.waist_pitch
-        lean = q[7 + waist] + self.problem.waist_share * sample.command[1] / max(len(waist), 1)
-        q[7 + waist] = np.clip(lean, self.lower[waist], self.upper[waist])
-        return q
-
-
-def ground_forces(model: Any, soles: list[int], wrench: Array) -> Any:
-    """Ground wrenches (2, 6) on a model's soles as pinocchio's list of forces in the joints' frames."""
-    forces = pinocchio.StdVec_Force([pinocchio.Force.Zero()] * model.njoints)
-    for sole, values in zip(soles, wrench, strict=True):
-        frame = model.frames[sole]
-        forces[frame.parentJoint] = frame.placement.act(pinocchio.Force(values))
-    return forces
-
-
-def posture_weights(robot: Robot, problem: PostureProblem) -> Array:
-    """Weight w of ½ w (θ - θ_default)², shape (15,) [1/rad²]: waist, sagittal (axis across the body) or lateral."""
-    weights = np.full(len(robot.support), problem.sagittal_weight)
-    weights[robot.lateral] = problem.lateral_weight
-    weights[robot.waist] = problem.waist_weight
-    return weights
 
 
 @dataclass(frozen=True)
@@ -188,20 +102,90 @@ class SoleLimits:
         return rows, bound
 
 
-def sole_limits(robot: Robot, problem: PostureProblem) -> SoleLimits:
-    """Limits of both soles: the rectangle inside the contact points, shrunk by the recipe."""
-    half_length, half_width = problem.sole_fraction * np.abs(robot.sole_polygon).min(axis=(0, 1))
-    return SoleLimits(problem.friction, float(half_length), float(half_width), problem.smallest_load)
+class SupportModel:
+    """Base and support joints in the robot's order; `lock` adds the arms' inertia."""
+
+    def __init__(self, robot: Robot, problem: PostureProblem, height: Literal["pelvis", "com"] = "pelvis") -> None:
+        """`height`: that of the pelvis or of the centre of mass, as a sample commands it."""
+        self.robot, self.problem, self.height = robot, problem, height
+        self.full = build_model(robot)
+        self.full_data = self.full.createData()
+        self._arms = [self.full.getJointId(robot.joints[index]) for index in robot.interaction]
+        self._neutral = pinocchio.neutral(self.full)
+        self.model = pinocchio.buildReducedModel(self.full, self._arms, self._neutral)
+        expected = [robot.joints[index] for index in robot.support]
+        if list(self.model.names)[2:] != expected:
+            raise ValueError(
+                f"{robot.folder}: the support joints must stand in the MJCF's order: {self.model.names[2:]}"
+            )
+        self.data = self.model.createData()
+        self.soles = [self.model.getFrameId(site) for site in robot.soles]
+        self.torso = self.model.getFrameId(robot.torso)
+        self.base = self.model.getFrameId(robot.base)
+        self._torso_joint = int(self.model.frames[self.torso].parentJoint)
+        self._full_torso = self.full.getJointId(self.model.names[self._torso_joint])
+        centres = 0.5 * problem.stance_width * np.array([[0.0, 1.0, 0.0], [0.0, -1.0, 0.0]])
+        self.stance = [pinocchio.SE3(np.eye(3), centre) for centre in centres]
+        """Places of the left and of the right sole's centre on the ground."""
+        margin = problem.limit_margin
+        self.lower, self.upper = robot.lower[robot.support] + margin, robot.upper[robot.support] - margin
+        self.effort = problem.effort_fraction * robot.effort[robot.support]
+        self.posture_weights = np.full(len(robot.support), problem.sagittal_weight)
+        """Weight w of ½ w (θ - θ_default)², shape (15,) [1/rad²]: waist, sagittal (axis across the body) or lateral."""
+        self.posture_weights[robot.lateral] = problem.lateral_weight
+        self.posture_weights[robot.waist] = problem.waist_weight
+        half_length, half_width = problem.sole_fraction * np.abs(robot.sole_polygon).min(axis=(0, 1))
+        self.limits = SoleLimits(problem.friction, float(half_length), float(half_width), problem.smallest_load)
+        """Limits of either sole: the rectangle inside the contact points, shrunk by the recipe."""
+        corners = robot.sole_polygon + centres[:, None, :2]
+        edges = np.unique(ConvexHull(corners.reshape(-1, 2)).equations.round(12), axis=0)
+        self._inward, self._offset = -edges[:, :2], -edges[:, 2]  # distance inside an edge: normal · point + offset
+
+    def lock(self, sample: Sample) -> None:
+        """Adds the inertia of the arms in their posture to the torso."""
+        q = self._neutral.copy()
+        q[7 + self.robot.interaction] = sample.arm
+        pinocchio.forwardKinematics(self.full, self.full_data, q)
+        torso = self.full_data.oMi[self._full_torso]
+        inertia = self.full.inertias[self._full_torso].copy()
+        for joint in self._arms:
+            inertia += torso.actInv(self.full_data.oMi[joint]).act(self.full.inertias[joint])
+        self.model.inertias[self._torso_joint] = inertia
+
+    def whole(self, configuration: Array, arm: Array) -> Array:
+        """Configuration of the full model (36,) from the reduced one (22,) and the arms (14,)."""
+        q = np.empty(self.full.nq)
+        q[:7] = configuration[:7]
+        q[7 + self.robot.support] = configuration[7:]
+        q[7 + self.robot.interaction] = arm
+        return q
+
+    def start(self) -> Array:
+        """The default posture with the soles in their places, shape (22,)."""
+        q: Array = pinocchio.neutral(self.model)
+        q[7:] = self.robot.default_position[self.robot.support]
+        pinocchio.framesForwardKinematics(self.model, self.data, q)
+        soles = [self.data.oMf[sole].translation for sole in self.soles]
+        q[:3] = -0.5 * (soles[0] + soles[1])
+        return q
+
+    def margin(self, point: Array) -> Array:
+        """Distance of points (..., 2) to the nearest edge of both soles' convex hull, positive inside [m]."""
+        return (point @ self._inward.T + self._offset).min(axis=-1)
+
+    def rest(self, sample: Sample) -> Array:
+        """Reference of the posture cost, (22,): default posture, with part of the commanded pitch in the waist."""
+        q = self.start()
+        waist = self.robot.waist_pitch
+        lean = q[7 + waist] + self.problem.waist_share * sample.command[1] / max(len(waist), 1)
+        q[7 + waist] = np.clip(lean, self.lower[waist], self.upper[waist])
+        return q
 
 
-def support_edges(robot: Robot, problem: PostureProblem) -> tuple[Array, Array]:
-    """Inward normals n (edges, 2) and offsets d (edges,) [m] of both soles' convex hull: distance inside is n·p + d."""
-    corners = robot.sole_polygon + mean_stance(problem.stance_width)[:, None, :2]
-    equations = np.unique(ConvexHull(corners.reshape(-1, 2)).equations.round(12), axis=0)
-    return -equations[:, :2], -equations[:, 2]
-
-
-def support_margin(edges: tuple[Array, Array], point: Array) -> Array:
-    """Distance of points (..., 2) to the nearest edge, positive inside [m]."""
-    normals, offsets = edges
-    return (point @ normals.T + offsets).min(axis=-1)
+def ground_forces(model: Any, soles: list[int], wrench: Array) -> Any:
+    """Ground wrenches (2, 6) on a model's soles as pinocchio's list of forces in the joints' frames."""
+    forces = pinocchio.StdVec_Force([pinocchio.Force.Zero()] * model.njoints)
+    for sole, values in zip(soles, wrench, strict=True):
+        frame = model.frames[sole]
+        forces[frame.parentJoint] = frame.placement.act(pinocchio.Force(values))
+    return forces

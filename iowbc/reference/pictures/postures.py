@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from iowbc.errors import Rejected
-from iowbc.reference.labels.gates import LabelChecker
+from iowbc.reference.labels.checks import LabelChecker
 from iowbc.reference.labels.gauss_newton import StaticMethod
 from iowbc.reference.labels.plan import SamplePlan
 from iowbc.reference.labels.support_model import Posture, Sample, SupportModel

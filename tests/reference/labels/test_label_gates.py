@@ -9,7 +9,7 @@ import pytest
 
 from iowbc.errors import Rejected
 from iowbc.recipe.generator import LabelGates, ReferenceGenerator
-from iowbc.reference.labels.gates import LabelChecker
+from iowbc.reference.labels.checks import LabelChecker
 from iowbc.reference.labels.gauss_newton import StaticMethod
 from iowbc.reference.labels.support_model import Posture, Sample, SupportModel
 
