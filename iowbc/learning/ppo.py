@@ -30,7 +30,7 @@ from iowbc.learning.normalization import Normalization
 from iowbc.learning.perceptron import Perceptron
 from iowbc.learning.policy import ActorCritic, acting_part
 from iowbc.learning.rollout import Samples
-from iowbc.recipe.skill.skill import SkillLearning
+from iowbc.recipe.ppo import SkillLearning
 from iowbc.recipe.teacher import Teacher
 from iowbc.rollouts.blocks import block_size
 from iowbc.rollouts.rollout_policies import ExploringPolicy
