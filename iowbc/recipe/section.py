@@ -22,8 +22,6 @@ COSMETIC: dict[str, Any] = {"cosmetic": True}
 LATER: dict[str, Any] = {"later": True}
 """Marks a field that was added after artifacts were published. Its default is the earlier behaviour and is not part of
 the key, so that the keys of those artifacts stay valid."""
-
-
 Problems = Iterator[tuple[str, str]]
 """Inconsistent values of a recipe: pairs of a dotted path and a message."""
 

@@ -38,6 +38,10 @@ class _Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[mi
     yaml_implicit_resolvers: dict[str, list[tuple[str, re.Pattern[str]]]] = {}  # noqa: RUF012 (PyYAML's own attribute)
 
 
+class _Dumper(getattr(yaml, "CSafeDumper", yaml.SafeDumper)):  # type: ignore[misc]
+    """Quotes text that any version of YAML reads as another type; PyYAML by itself does not quote `1e3`."""
+
+
 PLAIN_TAGS = [f"tag:yaml.org,2002:{name}" for name in ("null", "bool", "int", "float", "str", "seq", "map")]
 _NULL, _BOOL, _INT, _FLOAT = PLAIN_TAGS[:4]
 IMPLICIT = (
@@ -60,8 +64,9 @@ CONVERSIONS: dict[str, Callable[[str], Scalar]] = {
     _FLOAT: lambda text: float(text.lower().replace(".inf", "inf").replace(".nan", "nan")),
 }
 """Values of these scalars, by tag."""
-for _tag, _pattern, _first in IMPLICIT:
-    _Loader.add_implicit_resolver(_tag, _pattern, _first)
+for _resolver in IMPLICIT:
+    _Loader.add_implicit_resolver(*_resolver)
+    _Dumper.add_implicit_resolver(*_resolver)
 
 
 def read_document(text: str, file: str) -> Located:
@@ -189,14 +194,6 @@ def leaves(tree: Located, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[st
         return
     for name, entry in tree.value.items() if isinstance(tree.value, dict) else enumerate(tree.value):
         yield from leaves(entry, (*path, str(name)))
-
-
-class _Dumper(getattr(yaml, "CSafeDumper", yaml.SafeDumper)):  # type: ignore[misc]
-    """Quotes text that any version of YAML reads as another type; PyYAML by itself does not quote `1e3`."""
-
-
-for _tag, _pattern, _first in IMPLICIT:
-    _Dumper.add_implicit_resolver(_tag, _pattern, _first)
 
 
 def as_yaml(recipe: BaseModel) -> str:

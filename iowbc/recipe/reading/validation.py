@@ -75,11 +75,10 @@ def _of_its_own(path: Sequence[str]) -> Located:
 
 def _problems(tree: Located, errors: Sequence[ErrorDetails]) -> list[Problem]:
     """One problem per location and key; messages of the members of a union about the same value are joined."""
-    texts: dict[tuple[str, str], list[str]] = {}
-    for place, head, text in (found for error in errors[:PROBLEMS_TOLD] for found in _each_problem(tree, error)):
-        texts.setdefault((place, head), [])
-        if text not in texts[place, head]:
-            texts[place, head].append(text)
+    texts: dict[tuple[str, str], dict[str, None]] = {}
+    for error in errors[:PROBLEMS_TOLD]:
+        for place, head, text in _each_problem(tree, error):
+            texts.setdefault((place, head), {})[text] = None  # each text once, in order
     problems = [Problem(place, f"{head}: {', or '.join(parts)}") for (place, head), parts in texts.items()]
     return sorted(problems, key=lambda problem: _position(problem.place))
 
