@@ -70,7 +70,7 @@ class Labeller:
         else:
             self.method = StaticMethod(support)
 
-    def solve(self, index: int, sample: Sample) -> dict[str, Array]:
+    def solve(self, sample: Sample) -> dict[str, Array]:
         """A label that passed every gate, as arrays named as in the dataset. Raises `Rejected`."""
         self.judge.arms(sample)
         posture = self.method.solve(sample)
@@ -244,7 +244,7 @@ def _label_chunk(solver: Labeller, indices: Sequence[int], crashed: Sequence[int
             continue
         current.value = index
         try:
-            labels[index] = solver.solve(index, sample)
+            labels[index] = solver.solve(sample)
         except Rejected as reason:
             rejected[index] = str(reason)
     current.value = IDLE
