@@ -27,8 +27,7 @@ from iowbc.learning.storage import load_teacher, save_network
 from iowbc.recipe.evaluation.sequences import Segment
 from iowbc.recipe.reading.loading import load_recipe
 from iowbc.recipe.recipe import Recipe
-from iowbc.reference.labels.labelling import LabelTask
-from iowbc.reference.labels.pool import label_all
+from iowbc.reference.labels.pool import LabelTask, label_all
 from iowbc.robot.description import load_robot, robot_folder
 from iowbc.rollouts.blocks import block_size
 from iowbc.rollouts.rollout import ExploringPolicy

@@ -8,7 +8,7 @@ from iowbc.control.action import action_scale
 from iowbc.control.command import HEIGHT, PITCH, VELOCITY, YAW_RATE
 from iowbc.control.observation import observation_layout
 from iowbc.errors import StageFailed
-from iowbc.recipe.evaluation.public_controller import PublicController
+from iowbc.recipe.evaluation.baselines import PublicController
 from iowbc.recipe.task.task import Task
 from iowbc.robot.description import Robot
 

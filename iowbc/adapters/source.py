@@ -16,7 +16,7 @@ from iowbc.adapters.adapter import PLACE, Adapter, validate_adapter
 from iowbc.errors import StageFailed
 from iowbc.files import file_digest
 from iowbc.recipe.beside import CustomFunction
-from iowbc.recipe.evaluation.public_controller import PublicController
+from iowbc.recipe.evaluation.baselines import PublicController
 from iowbc.recipe.task.task import Task
 from iowbc.robot.description import DESCRIPTION, Robot, kind_of, side_sign
 from iowbc.task.own_function import load_function

@@ -8,7 +8,7 @@ from pathlib import Path
 from textwrap import shorten
 from typing import Literal, Self, TypeVar
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, NonNegativeFloat, ValidationError, model_validator
 
 from iowbc.control.command import COMMAND
 from iowbc.control.feasible_map import FEASIBLE
@@ -16,7 +16,7 @@ from iowbc.control.generator import ARCHITECTURE, WEIGHTS
 from iowbc.deploy.exported_folder import CONTRACT, GENERATOR, ROBOT, SETTLE, STEP
 from iowbc.errors import ContractBroken
 from iowbc.files import file_digest
-from iowbc.recipe.section import NonNegative, Section
+from iowbc.recipe.section import Section
 from iowbc.recipe.simulation.simulation import SensorNoise
 from iowbc.recipe.task.commands import Commands
 from iowbc.recipe.task.joint_references import References
@@ -96,13 +96,13 @@ class Contract(Section):
     """Places of the support joints in `joints`, in the order of every 15-vector."""
     interaction: tuple[int, ...]
     """Places of the arm joints in `joints`, in the order of `arm_reference`."""
-    kp: tuple[NonNegative, ...]
+    kp: tuple[NonNegativeFloat, ...]
     """Position gains of the PD loop, all joints [N·m/rad]."""
-    kd: tuple[NonNegative, ...]
+    kd: tuple[NonNegativeFloat, ...]
     """Velocity gains of the PD loop, all joints [N·m·s/rad]."""
-    effort: tuple[NonNegative, ...]
+    effort: tuple[NonNegativeFloat, ...]
     """Torque limits [N·m]."""
-    velocity_limit: tuple[NonNegative, ...]
+    velocity_limit: tuple[NonNegativeFloat, ...]
     """Joint speed limits [rad/s]."""
     lower: tuple[float, ...]
     """Lower joint limits [rad]."""

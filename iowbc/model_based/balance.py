@@ -11,12 +11,10 @@ import numpy as np
 import pinocchio
 
 from iowbc.arrays import Array
-from iowbc.recipe.evaluation.model_based import ModelBased
+from iowbc.recipe.evaluation.baselines import ModelBased
 from iowbc.recipe.generator import PostureProblem
 from iowbc.reference.labels.gauss_newton import UNBOUNDED, constrained_step
-from iowbc.reference.labels.sample import Sample
-from iowbc.reference.labels.soles import sole_limits
-from iowbc.reference.labels.support_model import SupportModel
+from iowbc.reference.labels.support_model import Sample, SupportModel
 from iowbc.robot.description import Robot
 
 LIMITS = ("friction", "sole_fraction", "smallest_load", "limit_margin", "effort_fraction")
@@ -44,7 +42,7 @@ class Balance:
         self.settings, self.support = settings, SupportModel(robot, problem)
         self.model, self.data = self.support.model, self.support.data
         self.joints, self.velocities = len(robot.support), self.model.nv
-        cone, bound = sole_limits(robot, problem).rows()
+        cone, bound = self.support.limits.rows()
         self._cone, self._bound = np.kron(np.eye(2), cone), np.tile(bound, 2)
         support = robot.support.tolist()
         places = [[support.index(joint) for joint in pair] for pair in robot.linkages]

@@ -1,17 +1,19 @@
 """The whole recipe: one experiment, from the reference generator to the exported policy."""
 
+from collections.abc import Mapping
 from typing import Any, Literal, Self, get_args
 
 from pydantic import Field, field_validator
 
+from iowbc.errors import nearest
 from iowbc.recipe.distillation import Distillation
-from iowbc.recipe.evaluation.evaluation import Evaluation
+from iowbc.recipe.evaluation.evaluation import Evaluation, TrialScene
 from iowbc.recipe.execution import Execution
 from iowbc.recipe.export import Export
 from iowbc.recipe.generator import ReferenceGenerator
-from iowbc.recipe.scene_names import scene_name_problems
-from iowbc.recipe.section import Problems, Section
-from iowbc.recipe.simulation.holding import held_delay_problems
+from iowbc.recipe.section import Problems, Section, marked_fields
+from iowbc.recipe.simulation.holding import WITH_OBJECT, held_delay_problems
+from iowbc.recipe.simulation.scene import Scenes
 from iowbc.recipe.simulation.simulation import SimulationSettings
 from iowbc.recipe.skill.skill import Skill
 from iowbc.recipe.task.task import Task
@@ -84,7 +86,7 @@ class Recipe(Section):
             yield "task.references.height", f"{text}, and rg.height: com commands that of the centre of mass"
         if self.task.action.previous_share and self.eval.policy in ("model", "public"):
             yield "task.action.previous_share", f"eval.policy: {self.eval.policy} sets joint targets itself; take 0"
-        yield from scene_name_problems(self)
+        yield from _scene_name_problems(self)
         yield from held_delay_problems(self.eval, "eval", self.eval.simulation or self.simulation)
 
     @field_validator("stages")
@@ -94,6 +96,63 @@ class Recipe(Section):
         if repeated:
             raise ValueError(f"names {', '.join(repeated)} more than once")
         return tuple(sorted(stages, key=PIPELINE.index))
+
+
+def _scene_name_problems(recipe: Recipe) -> Problems:
+    """Invalid scene names and incomplete custom scenes: pairs of a dotted path and a message."""
+    task, evaluation, trained = recipe.task, recipe.eval, recipe.simulation.scenes
+    worlds = {"simulation.scenes": trained}
+    if evaluation.simulation is not None:
+        worlds["eval.simulation.scenes"] = evaluation.simulation.scenes
+    named = tuple(dict.fromkeys(name for scenes in worlds.values() for name in scenes.names))
+    for path, entries, known in (
+        ("task.scenes", task.scenes, trained.names),
+        ("task.references.grasps", task.references.grasps, named),
+        ("task.references.loads", task.references.loads, named),
+    ):
+        for name in entries.own:
+            if name not in known:
+                text = f"no scene {name!r} in simulation.scenes; there are: {', '.join(known)}{nearest(name, known)}"
+                yield f"{path}.{name}", text
+    for path, scenes in worlds.items():
+        for name in scenes.own:
+            yield from _incomplete(f"{path}.{name}", name, scenes, task)
+    for place, name in (
+        *((f"teacher.check.others.{name}", name) for name in recipe.teacher.check.others),
+        *marked_fields(recipe.export, "export", WITH_OBJECT),
+        *marked_fields(recipe.skill, "skill", WITH_OBJECT),
+    ):
+        yield from _without_object(place, name, "simulation.scenes", trained)
+    path, scenes = list(worlds.items())[-1]
+    if evaluation.scenes:
+        path, scenes = f"{path} and eval.scenes", with_scenes(scenes, evaluation.scenes)
+    for place, name in marked_fields(evaluation, "eval", WITH_OBJECT):
+        yield from _without_object(place, name, path, scenes)
+
+
+def with_scenes(scenes: Scenes, further: Mapping[str, TrialScene]) -> Scenes:
+    """Scenes merged with those of the trials, which may replace some."""
+    return Scenes.model_validate({**dict(scenes), **{name: own.scene for name, own in further.items()}})
+
+
+def _incomplete(path: str, name: str, scenes: Scenes, task: Task) -> Problems:
+    """Missing entries of a custom scene."""
+    scene, references = getattr(scenes, name), task.references
+    if name not in references.grasps.names:
+        near = references.grasps.push if scene.kind == "push" else references.grasps.lift
+        text = "has no base grasp: give the left wrist's place from the pelvis [m], for example"
+        yield path, f"{text} task.references.grasps.{name}: {list(near)}"
+    if name not in references.loads.names:
+        half = 0.5 * scene.object.mass if scene.kind == "lift" else 0.0
+        text = "does not say what the arms expect to carry [kg]: give, for example"
+        yield path, f"{text} task.references.loads.{name}: {half:g}"
+
+
+def _without_object(path: str, name: str, where: str, scenes: Scenes) -> Problems:
+    loaded = [known for known in scenes.names if getattr(scenes, known).object is not None]
+    if name not in loaded:
+        text = f"no scene {name!r} with an object; valid: {', '.join(loaded)}; a mass of 0 is without one"
+        yield path, f"{text}; see {where}{nearest(name, loaded)}"
 
 
 def recipe_schema() -> dict[str, Any]:

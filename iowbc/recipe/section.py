@@ -9,9 +9,10 @@ import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, GetJsonSchemaHandler, PositiveFloat, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, GetJsonSchemaHandler, model_validator
 from pydantic.fields import FieldInfo
 from pydantic.json_schema import JsonSchemaValue
+from pydantic.types import NonNegativeFloat, PositiveFloat
 from pydantic_core import CoreSchema
 
 from iowbc.errors import shown
@@ -21,8 +22,6 @@ COSMETIC: dict[str, Any] = {"cosmetic": True}
 LATER: dict[str, Any] = {"later": True}
 """Marks a field that was added after artifacts were published. Its default is the earlier behaviour and is not part of
 the key, so that the keys of those artifacts stay valid."""
-
-
 Problems = Iterator[tuple[str, str]]
 """Inconsistent values of a recipe: pairs of a dotted path and a message."""
 
@@ -50,22 +49,18 @@ Range = Annotated[tuple[float, float], AfterValidator(in_order)]
 """Lower and upper end."""
 Ascending = Annotated[tuple[PositiveFloat, ...], AfterValidator(ascending), Field(min_length=1)]
 """Positive values that ascend without repetition."""
-Masses = Annotated[tuple[Annotated[float, Field(ge=0)], ...], AfterValidator(ascending)]
+Masses = Annotated[tuple[NonNegativeFloat, ...], AfterValidator(ascending)]
 """Masses [kg] that ascend without repetition."""
 Distinct = AfterValidator(_distinct)
 """Marks tuples whose values must differ from each other."""
-Positive = Annotated[float, Field(gt=0)]
-NonNegative = Annotated[float, Field(ge=0)]
 PositiveRange = Annotated[tuple[PositiveFloat, PositiveFloat], AfterValidator(in_order)]
-NonNegativeRange = Annotated[tuple[NonNegative, NonNegative], AfterValidator(in_order)]
+NonNegativeRange = Annotated[tuple[NonNegativeFloat, NonNegativeFloat], AfterValidator(in_order)]
 Share = Annotated[float, Field(ge=0, le=1)]
 Vector = tuple[float, float, float]
 HiddenLayers = Annotated[tuple[Annotated[int, Field(gt=0, le=16_384)], ...], Field(max_length=16)]
 """Units of the hidden layers of a network."""
 ArtifactName = Annotated[str, Field(pattern=r"^([0-9a-f]{8,64}|.+\.ya?ml)$", max_length=300)]
 """Artifact of another recipe: that recipe's file, or the first characters (8 or more) of the artifact's key."""
-RecipeFile = Annotated[str, Field(pattern=r".+\.ya?ml$", max_length=300)]
-"""The file of another recipe."""
 OWN_NAME = "[a-z][a-z0-9_]{0,31}"
 """Pattern of the name of a custom scene or reward term."""
 CustomName = Annotated[str, Field(pattern=f"^{OWN_NAME}$")]

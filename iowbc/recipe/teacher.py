@@ -18,8 +18,6 @@ STAND_WALK_TURN = (
     Segment(duration=2.0, ramp=0.5),
 )
 """Stand, walk, turn, crouch and lean, stand: 10 s."""
-
-
 Errors = tuple[PositiveFloat, PositiveFloat, PositiveFloat, PositiveFloat]
 IO_WBC_UNLOADED = (0.125, 0.015, 0.046, 0.134)
 

@@ -13,8 +13,8 @@ from iowbc.pipeline.stage import Job, Stage
 
 if TYPE_CHECKING:
     from iowbc.pipeline.cluster.spread import NodeSpread
-    from iowbc.reference.labels.labelling import LabelTask
-    from iowbc.reference.labels.shards import Shard
+    from iowbc.reference.labels.dataset import Shard
+    from iowbc.reference.labels.pool import LabelTask
 
 LABELLED = "labelled.npz"
 """Map of commands with labels; `feasible.npz` of rg-fit is its part without jumps of the network."""
@@ -30,11 +30,9 @@ def run(job: Job) -> None:
 
     from iowbc.errors import NoRenderer
     from iowbc.reference.labels.checks import chosen_for_crosscheck, compare_methods, mirror_error
-    from iowbc.reference.labels.dataset import assemble
-    from iowbc.reference.labels.labelling import LabelTask
+    from iowbc.reference.labels.dataset import assemble, reasons
     from iowbc.reference.labels.plan import SamplePlan
-    from iowbc.reference.labels.pool import label_all
-    from iowbc.reference.labels.shards import reasons
+    from iowbc.reference.labels.pool import LabelTask, label_all
     from iowbc.reference.pictures.figures import dataset_figures
     from iowbc.reference.pictures.postures import draw_strip
     from iowbc.reference.ranges import wrong_ranges

@@ -13,9 +13,8 @@ def run(job: Job) -> None:
 
     from iowbc.control.feasible_map import FeasibleMap
     from iowbc.control.generator import ReferenceNetwork
-    from iowbc.reference.fit.fitting import fit
-    from iowbc.reference.fit.gates import check_fit, measure_jumps
-    from iowbc.reference.fit.preparation import prepare
+    from iowbc.reference.fit.errors import check_fit, measure_jumps, task_errors
+    from iowbc.reference.fit.fitting import fit, prepare
     from iowbc.reference.labels.dataset import Dataset
     from iowbc.reference.labels.plan import SamplePlan
     from iowbc.reference.pictures.figures import error_figures, gentle_figure, learning_figure
@@ -47,7 +46,7 @@ def run(job: Job) -> None:
 
     held = prepared.held_out
     predicted = network(dataset.arm[held], dataset.command[held])
-    errors = prepared.kinematics.errors([prepared.samples[i] for i in held], predicted.astype(np.float64))
+    errors = task_errors(prepared.support, [prepared.samples[i] for i in held], predicted.astype(np.float64))
     jumps = measure_jumps(network, rg, feasible, dataset.arm[held], job.recipe.seed)
     verdict = check_fit(rg.fit.gates, dataset, held, predicted, errors, jumps)
     samples = {"training": len(prepared.train.inputs), "held_out": len(held), "best_epoch": fitted.epochs}

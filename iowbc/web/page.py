@@ -7,7 +7,6 @@ import subprocess
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -40,21 +39,16 @@ def write_page(exported: Path, out: Path, cache: Path, say: Callable[[str], None
     world = exported_world(exported)
     scenes = web_scenes(world, load_robot(world.robot))
     first = next((name for name, _ in accepted(world.recipe)), FREE)
-    about = {"scenes": scenes, "first": first, "golden": golden_vectors(exported)}
+    golden = None
+    if (path := exported / exported_folder.GOLDEN).is_file():
+        with np.load(path, allow_pickle=False) as file:
+            golden = {name: values.tolist() for name, values in file.items()}  # a row for each step
+    about = {"scenes": scenes, "first": first, "golden": golden}
     out.mkdir(parents=True, exist_ok=True)
     (out / SCENES).write_text(json.dumps(about, separators=(",", ":")), encoding="utf-8")  # first: it marks the folder
     for name in (exported_folder.SETTLE, exported_folder.STEP, exported_folder.CONTRACT):
         shutil.copyfile(exported / name, out / name)
     bundle(parts, out)
-
-
-def golden_vectors(exported: Path) -> dict[str, list[Any]] | None:
-    """Golden vectors of an exported folder by name, a row for each step; None where it has none."""
-    path = exported / exported_folder.GOLDEN
-    if not path.is_file():
-        return None
-    with np.load(path, allow_pickle=False) as file:
-        return {name: values.tolist() for name, values in file.items()}
 
 
 def npm_parts(cache: Path, say: Callable[[str], None]) -> Path:

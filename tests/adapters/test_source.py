@@ -13,7 +13,7 @@ from iowbc.adapters.networks import network
 from iowbc.adapters.source import load_adapter, policy_digest, policy_path
 from iowbc.errors import StageFailed
 from iowbc.recipe.beside import ModuleFile
-from iowbc.recipe.evaluation.public_controller import PublicController
+from iowbc.recipe.evaluation.baselines import PublicController
 from iowbc.robot.g1_motors import MOTORS
 
 pytestmark = pytest.mark.unit

@@ -11,8 +11,8 @@ import pytest
 
 from iowbc.errors import Rejected
 from iowbc.model_based.balance import Balance, Solution
-from iowbc.recipe.evaluation.model_based import ModelBased
-from iowbc.reference.labels.sample import Sample
+from iowbc.recipe.evaluation.baselines import ModelBased
+from iowbc.reference.labels.support_model import Sample
 from iowbc.robot.description import GRAVITY, Robot
 
 MASS = 33.341142

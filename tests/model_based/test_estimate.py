@@ -5,25 +5,28 @@ from typing import Any
 import numpy as np
 import pytest
 
-from iowbc.model_based.estimate import MotionFilter
-from iowbc.recipe.evaluation.model_based import Estimation
+from iowbc.model_based.policy import Motion, motion_gains
+from iowbc.recipe.evaluation.baselines import Estimation
 
 PERIOD, JOINTS = 0.02, 2
 UPRIGHT = np.array([0.0, 0.0, -1.0])
 
 
+def at_rest() -> Motion:
+    return Motion(UPRIGHT, np.zeros(JOINTS), motion_gains(JOINTS, PERIOD, Estimation()), PERIOD)
+
+
 def followed(planned: float, made: float, noise: float, steps: int = 400) -> tuple[Any, Any]:
     """Rates of a joint that accelerates by `made` while `planned` was, [rad/s²]: estimated and true, (steps,)."""
-    motion, random = MotionFilter(1, JOINTS, PERIOD, Estimation()), np.random.default_rng(0)
-    motion.begin(0, UPRIGHT, np.zeros(JOINTS))
+    motion, random = at_rest(), np.random.default_rng(0)
     angle, rate, found, true = 0.0, 0.0, [], []
     for _ in range(steps):
         joints = angle + noise * 0.01 * random.normal(size=JOINTS)
         rates = np.concatenate([np.zeros(3), rate + noise * 0.5 * random.normal(size=JOINTS)])
-        motion.correct(0, UPRIGHT, joints, rates)
-        found.append(motion.rates[0, 3])
+        motion.correct(UPRIGHT, joints, rates)
+        found.append(motion.rates[3])
         true.append(rate)
-        motion.advance(0, np.concatenate([np.zeros(3), np.full(JOINTS, planned)]))
+        motion.advance(np.concatenate([np.zeros(3), np.full(JOINTS, planned)]))
         angle, rate = angle + PERIOD * rate + 0.5 * PERIOD**2 * made, rate + PERIOD * made
     return np.array(found), np.array(true)
 
@@ -45,10 +48,9 @@ def test_the_estimate_is_four_times_as_near_as_the_sensor() -> None:
 
 
 def test_gravity_stays_a_direction_and_turns_with_the_base() -> None:
-    motion = MotionFilter(1, JOINTS, PERIOD, Estimation())
-    motion.begin(0, UPRIGHT, np.zeros(JOINTS))
-    motion.rates[0, 1] = 0.5
+    motion = at_rest()
+    motion.rates[1] = 0.5
     for _ in range(20):
-        motion.advance(0, np.zeros(3 + JOINTS))
+        motion.advance(np.zeros(3 + JOINTS))
     pitch = 0.5 * 20 * PERIOD
-    np.testing.assert_allclose(motion.gravity[0], [np.sin(pitch), 0.0, -np.cos(pitch)], atol=2e-3)
+    np.testing.assert_allclose(motion.gravity, [np.sin(pitch), 0.0, -np.cos(pitch)], atol=2e-3)

@@ -11,8 +11,7 @@ from stage_jobs import make_job
 from iowbc.control.arms import ArmKinematics
 from iowbc.pipeline.stage import Job
 from iowbc.recipe.generator import ReferenceGenerator
-from iowbc.reference.labels.sample import Sample
-from iowbc.reference.labels.support_model import SupportModel
+from iowbc.reference.labels.support_model import Sample, SupportModel
 from iowbc.robot.description import Robot
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from iowbc.errors import Rejected
 from iowbc.recipe.recipe import Recipe
-from iowbc.reference.labels.sample import Sample
+from iowbc.reference.labels.support_model import Sample
 
 SMALL: dict[str, Any] = {
     "sampling": {"samples": 400, "mirrored_share": 0.1},
@@ -58,8 +58,8 @@ class Double:
     def draw(self, indices: Any) -> list[Sample]:
         return [Sample(np.full(14, float(index)), np.zeros(2)) for index in indices]
 
-    def solve(self, index: int, sample: Sample) -> dict[str, Any]:
-        assert sample.arm[0] == index
+    def solve(self, sample: Sample) -> dict[str, Any]:
+        index = int(sample.arm[0])
         if index in self.task.crashes:
             os.kill(os.getpid(), signal.SIGSEGV)
         if index in self.task.killed and self.task.first_time(index):

@@ -11,7 +11,7 @@ from changes import with_changes
 
 from iowbc.benchmarks import simulation
 from iowbc.benchmarks.bare_loop import STATE, bare_loops, record
-from iowbc.benchmarks.breakdown import PARTS, step_breakdown
+from iowbc.benchmarks.simulation import PARTS, step_breakdown
 from iowbc.benchmarks.standing_generator import write_standing_generator
 from iowbc.control.command import COMMAND, HEIGHT, PITCH
 from iowbc.control.references import ReferenceLayer

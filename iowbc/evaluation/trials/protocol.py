@@ -14,8 +14,7 @@ from iowbc.evaluation.trials.plan import Trial, case_trials, compliance_trials, 
 from iowbc.evaluation.trials.rollout import PolicyInBatch, play_episodes
 from iowbc.files import newest_checked, write_checked
 from iowbc.learning.acting import Policy, load_policy
-from iowbc.recipe.recipe import Recipe
-from iowbc.recipe.scene_names import with_scenes
+from iowbc.recipe.recipe import Recipe, with_scenes
 from iowbc.recipe.task.joint_references import Grasps, Loads
 from iowbc.robot.description import load_robot
 from iowbc.rollouts.blocks import shares_in_blocks

@@ -5,8 +5,7 @@ from typing import Any, ClassVar, Literal
 
 from pydantic import Field
 
-from iowbc.recipe.evaluation.model_based import ModelBased
-from iowbc.recipe.evaluation.public_controller import PublicController
+from iowbc.recipe.evaluation.baselines import ModelBased, PublicController
 from iowbc.recipe.evaluation.sequences import DrawnScripts, Segment
 from iowbc.recipe.evaluation.suites import Compliance, HeavyCase, MassSweep, Probe, PushMap, Robustness, Stagnation
 from iowbc.recipe.section import COSMETIC, LATER, CustomName, Problems, Section, Vector

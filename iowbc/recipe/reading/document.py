@@ -38,6 +38,10 @@ class _Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[mi
     yaml_implicit_resolvers: dict[str, list[tuple[str, re.Pattern[str]]]] = {}  # noqa: RUF012 (PyYAML's own attribute)
 
 
+class _Dumper(getattr(yaml, "CSafeDumper", yaml.SafeDumper)):  # type: ignore[misc]
+    """Quotes text that any version of YAML reads as another type; PyYAML by itself does not quote `1e3`."""
+
+
 PLAIN_TAGS = [f"tag:yaml.org,2002:{name}" for name in ("null", "bool", "int", "float", "str", "seq", "map")]
 _NULL, _BOOL, _INT, _FLOAT = PLAIN_TAGS[:4]
 IMPLICIT = (
@@ -53,8 +57,16 @@ IMPLICIT = (
     ),
 )
 """Unquoted scalars that are not text: tag, pattern, and possible first characters."""
-for _tag, _pattern, _first in IMPLICIT:
-    _Loader.add_implicit_resolver(_tag, _pattern, _first)
+CONVERSIONS: dict[str, Callable[[str], Scalar]] = {
+    _NULL: lambda text: None,
+    _BOOL: lambda text: text.lower() == "true",
+    _INT: lambda text: int(text, 0 if text[:2] in ("0o", "0x") else 10),
+    _FLOAT: lambda text: float(text.lower().replace(".inf", "inf").replace(".nan", "nan")),
+}
+"""Values of these scalars, by tag."""
+for _resolver in IMPLICIT:
+    _Loader.add_implicit_resolver(*_resolver)
+    _Dumper.add_implicit_resolver(*_resolver)
 
 
 def read_document(text: str, file: str) -> Located:
@@ -139,18 +151,10 @@ class _Builder:
             self._complain(node, f"{shown(text)} has {len(text):,} characters; no number of a recipe has so many")
             return None
         try:
-            if node.tag == _NULL:
-                return None
-            if node.tag == _BOOL:
-                return text.lower() == "true"
-            if node.tag == _INT:
-                return int(text, 0) if text[:2] in ("0o", "0x") else int(text)
-            if node.tag == _FLOAT:
-                return float(text.lower().replace(".inf", "inf").replace(".nan", "nan"))
+            return CONVERSIONS.get(node.tag, str)(text)
         except ValueError:
             self._complain(node, f"{shown(text)} is not a {node.tag.split(':')[-1]}")
             return None
-        return text
 
     def _complain(self, node: yaml.Node, text: str) -> None:
         self.problems.append(Problem(self.place_of(node.start_mark), text))
@@ -190,14 +194,6 @@ def leaves(tree: Located, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[st
         return
     for name, entry in tree.value.items() if isinstance(tree.value, dict) else enumerate(tree.value):
         yield from leaves(entry, (*path, str(name)))
-
-
-class _Dumper(getattr(yaml, "CSafeDumper", yaml.SafeDumper)):  # type: ignore[misc]
-    """Quotes text that any version of YAML reads as another type; PyYAML by itself does not quote `1e3`."""
-
-
-for _tag, _pattern, _first in IMPLICIT:
-    _Dumper.add_implicit_resolver(_tag, _pattern, _first)
 
 
 def as_yaml(recipe: BaseModel) -> str:

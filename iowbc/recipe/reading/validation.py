@@ -75,11 +75,10 @@ def _of_its_own(path: Sequence[str]) -> Located:
 
 def _problems(tree: Located, errors: Sequence[ErrorDetails]) -> list[Problem]:
     """One problem per location and key; messages of the members of a union about the same value are joined."""
-    texts: dict[tuple[str, str], list[str]] = {}
-    for place, head, text in (found for error in errors[:PROBLEMS_TOLD] for found in _each_problem(tree, error)):
-        texts.setdefault((place, head), [])
-        if text not in texts[place, head]:
-            texts[place, head].append(text)
+    texts: dict[tuple[str, str], dict[str, None]] = {}
+    for error in errors[:PROBLEMS_TOLD]:
+        for place, head, text in _each_problem(tree, error):
+            texts.setdefault((place, head), {})[text] = None  # each text once, in order
     problems = [Problem(place, f"{head}: {', or '.join(parts)}") for (place, head), parts in texts.items()]
     return sorted(problems, key=lambda problem: _position(problem.place))
 
@@ -161,10 +160,14 @@ def descend(tree: Located, location: Sequence[int | str]) -> tuple[tuple[str, ..
 
 def models_at(path: Sequence[str]) -> list[type[BaseModel]]:
     """The sections that may stand at a path."""
-    candidates: list[Any] = [Recipe]
+    kinds: list[Any] = [Recipe]
     for name in path:
-        candidates = [inner for candidate in candidates for inner in _inside(candidate, name)]
-    return [model for candidate in candidates for model in _models(candidate)]
+        kinds = [kind for above in kinds for kind in _alternatives(_inside(above, name))]
+    return list(filter(_is_section, kinds))
+
+
+def _is_section(kind: Any) -> bool:
+    return isinstance(kind, type) and issubclass(kind, BaseModel)
 
 
 def _alternatives(annotation: Any) -> Iterator[Any]:
@@ -178,20 +181,13 @@ def _alternatives(annotation: Any) -> Iterator[Any]:
         yield annotation
 
 
-def _models(annotation: Any) -> list[type[BaseModel]]:
-    return [one for one in _alternatives(annotation) if isinstance(one, type) and issubclass(one, BaseModel)]
-
-
-def _inside(annotation: Any, name: str) -> Iterator[Any]:
-    """Annotations of the entry `name` of a value with the given annotation."""
-    for model in (models := _models(annotation)):
-        if name in model.model_fields:
-            yield model.model_fields[name].annotation
-        elif issubclass(model, NamedEntries):
-            yield get_args(model.__annotations__["__pydantic_extra__"])[1]
-    for collection in _alternatives(annotation):
-        if collection not in models:
-            yield from [argument for argument in get_args(collection) if argument is not Ellipsis][-1:]
+def _inside(kind: Any, name: str) -> Any:
+    """Annotation of the entry `name` of a section or a collection; None if it has none."""
+    if not _is_section(kind):
+        return next((argument for argument in reversed(get_args(kind)) if argument is not Ellipsis), None)
+    if name in kind.model_fields:
+        return kind.model_fields[name].annotation
+    return get_args(kind.__annotations__["__pydantic_extra__"])[1] if issubclass(kind, NamedEntries) else None
 
 
 def _elsewhere(name: str) -> str:
@@ -203,7 +199,7 @@ def _elsewhere(name: str) -> str:
 def _known_paths(model: type[BaseModel], path: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
     for name, field in model.model_fields.items():
         yield (*path, name)
-        for section in _models(field.annotation):
+        for section in filter(_is_section, _alternatives(field.annotation)):
             yield from _known_paths(section, (*path, name))
 
 

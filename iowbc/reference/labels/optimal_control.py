@@ -13,10 +13,8 @@ import pinocchio
 from iowbc.arrays import Array
 from iowbc.errors import Rejected
 from iowbc.recipe.generator import ReferenceGenerator
-from iowbc.reference.labels.gauss_newton import UNBOUNDED, constrained_step, kinematic_start
-from iowbc.reference.labels.sample import Posture, Sample
-from iowbc.reference.labels.soles import SoleLimits, sole_limits
-from iowbc.reference.labels.support_model import SupportModel, posture_weights
+from iowbc.reference.labels.gauss_newton import UNBOUNDED, PostureCost, constrained_step, cost_weights
+from iowbc.reference.labels.support_model import Posture, Sample, SupportModel
 
 STOP = 1e-10
 """Expected improvement at which the solver stops; crocoddyl's 5e-5 leaves flat postures where they started."""
@@ -31,8 +29,6 @@ class OptimalControlMethod:
         self.support, self.problem, self.ocp = support, recipe.problem, recipe.ocp
         self.state = crocoddyl.StateMultibody(support.model)
         self.actuation = crocoddyl.ActuationModelFloatingBase(self.state)
-        self.posture = posture_weights(support.robot, recipe.problem)
-        self.limits = sole_limits(support.robot, recipe.problem)
 
     def solve(self, sample: Sample) -> Posture:
         """The posture at the label's node, with the sole wrenches that hold it at rest. Raises `Rejected`."""
@@ -43,7 +39,7 @@ class OptimalControlMethod:
         if np.linalg.norm(states[-1][self.support.model.nq :]) > self.ocp.settled:
             raise Rejected("not settled")
         configuration = states[round(self.ocp.label_at * self.ocp.nodes)][: self.support.model.nq]
-        return Posture(configuration, distribute(self.support, configuration, self.limits))
+        return Posture(configuration, distribute(self.support, configuration))
 
     def trajectory(self, sample: Sample) -> list[Array]:
         """States (configuration, velocity) at the nodes. The support model must be locked to the sample."""
@@ -80,7 +76,7 @@ class OptimalControlMethod:
     def _costs(self, sample: Sample, *, terminal: bool) -> Any:
         """The running cost, or the terminal one: no torques or contact forces, velocities held to rest."""
         state, nu, nv = self.state, self.actuation.nu, self.support.model.nv
-        problem, support, limits = self.problem, self.support, self.limits
+        problem, support, limits = self.problem, self.support, self.support.limits
         factor = self.ocp.terminal_factor if terminal else 1.0
         velocity = self.ocp.terminal_velocity_weight / factor if terminal else self.ocp.velocity_weight
         costs = crocoddyl.CostModelSum(state, nu)
@@ -104,7 +100,7 @@ class OptimalControlMethod:
         add("torso", turn, np.full(3, problem.torso_weight))
         rest, free = np.concatenate([support.rest(sample), np.zeros(nv)]), np.full(nv, np.inf)
         deviation, angle = crocoddyl.ResidualModelState(state, rest, nu), rest[7 : support.model.nq]
-        add("posture", deviation, np.concatenate([np.zeros(6), self.posture, np.full(nv, velocity)]))
+        add("posture", deviation, np.concatenate([np.zeros(6), support.posture_weights, np.full(nv, velocity)]))
         lower = np.concatenate([-free[:6], support.lower - angle, -free])
         upper = np.concatenate([free[:6], support.upper - angle, free])
         limit("joint limits", deviation, lower, upper, factor * self.ocp.limit_weight)
@@ -119,7 +115,25 @@ class OptimalControlMethod:
         return costs
 
 
-def distribute(support: SupportModel, configuration: Array, limits: SoleLimits) -> Array:
+def kinematic_start(support: SupportModel, sample: Sample) -> Array:
+    """Configuration (22,) with the feet in place, the centre of mass over their middle, height and torso as commanded,
+    near the default posture, by Gauss-Newton steps on the cost without torques, with the feet as linearised equalities
+    and the joint ranges. The support model must be locked to the sample. Raises `Rejected` if the feet cannot stay."""
+    problem, weight = support.problem, np.concatenate(cost_weights(support))
+    q, largest = support.rest(sample), problem.largest_step
+    rest = q[7:].copy()
+    for _ in range(problem.iterations):
+        cost = PostureCost.at(support, q, sample, rest)
+        gradient, residual = weight[:, None] * cost.gradient, weight * cost.residual
+        lower, upper = np.maximum(support.lower - q[7:], -largest), np.minimum(support.upper - q[7:], largest)
+        step = constrained_step(gradient, residual, cost.equality, cost.error, cost.gradient[6:], lower, upper)
+        q = pinocchio.integrate(support.model, q, step)
+        if np.abs(step).max() < problem.tolerance:
+            break
+    return q
+
+
+def distribute(support: SupportModel, configuration: Array) -> Array:
     """The sole wrenches that hold a `configuration` (22,) with the least joint torques, (2, 6), in the soles' frames.
     Raises `Rejected` where the limits leave no equilibrium with gravity."""
     model, data = support.model, support.data
@@ -128,7 +142,7 @@ def distribute(support: SupportModel, configuration: Array, limits: SoleLimits) 
     pinocchio.updateFramePlacements(model, data)
     jacobians = [pinocchio.getFrameJacobian(model, data, sole, pinocchio.LOCAL).T for sole in support.soles]
     base, joints = np.split(np.concatenate(jacobians, axis=1), [6])
-    cone, bound = limits.rows()
+    cone, bound = support.limits.rows()
     rows, upper = np.kron(np.eye(2), cone), np.tile(bound, 2)
     lower = np.full(len(upper), -UNBOUNDED)
     return constrained_step(joints, -gravity[6:], base, -gravity[:6], rows, lower, upper).reshape(2, 6)

@@ -8,7 +8,7 @@ from iowbc.control.arms import ArmKinematics
 from iowbc.recipe.generator import ReferenceGenerator
 from iowbc.recipe.section import Interval
 from iowbc.recipe.task.joint_references import ArmReference
-from iowbc.reference.labels.sample import Sample
+from iowbc.reference.labels.support_model import Sample
 from iowbc.robot.description import Robot
 from iowbc.robot.mirror import interaction_mirror
 

@@ -14,14 +14,20 @@ from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
+from iowbc.arrays import Array
 from iowbc.errors import Interrupted, Rejected, WorkerFailed
 from iowbc.processes import die_with_parent, single_threaded
-from iowbc.reference.labels.labelling import Labeller, LabelTask
-from iowbc.reference.labels.shards import Shard, cut, merge, read_shard, write_shard
+from iowbc.recipe.generator import ReferenceGenerator
+from iowbc.reference.labels.checks import LabelChecker
+from iowbc.reference.labels.dataset import Shard, merge, read_shard, write_shard
+from iowbc.reference.labels.gauss_newton import StaticMethod
+from iowbc.reference.labels.plan import SamplePlan
+from iowbc.reference.labels.support_model import Sample, SupportModel
+from iowbc.robot.description import load_robot
 
 CRASHED = "solver crashed"
 CRASHES = tuple(-number for number in (signal.SIGSEGV, signal.SIGABRT, signal.SIGFPE, signal.SIGBUS, signal.SIGILL))
@@ -33,6 +39,48 @@ POLL = 0.2
 STARTS_WITHOUT_WORK = 3
 """Number of workers that die before their first sample at which labelling fails."""
 IDLE = -1
+
+
+@dataclass(frozen=True)
+class LabelTask:
+    """Specification from which a worker process builds its labeller."""
+
+    robot: Path
+    recipe: ReferenceGenerator
+    seed: int
+    method: Literal["static", "ocp"]
+
+    def prepare(self) -> "Labeller":
+        """Builds the models; called once in each worker."""
+        return Labeller(self)
+
+
+class Labeller:
+    """Draws samples by their numbers, and solves and checks them one at a time."""
+
+    def __init__(self, task: LabelTask) -> None:
+        robot, recipe = load_robot(task.robot), task.recipe
+        self.draw = SamplePlan(robot, recipe, task.seed).draw
+        support = SupportModel(robot, recipe.problem, recipe.height)
+        self.judge = LabelChecker(support, recipe.gates)
+        if task.method == "ocp":  # crocoddyl is loaded only where it is used
+            from iowbc.reference.labels.optimal_control import OptimalControlMethod
+
+            self.method: StaticMethod | OptimalControlMethod = OptimalControlMethod(support, recipe)
+        else:
+            self.method = StaticMethod(support)
+
+    def solve(self, sample: Sample) -> dict[str, Array]:
+        """A label that passed every gate, as arrays named as in the dataset. Raises `Rejected`."""
+        self.judge.arms(sample)
+        posture = self.method.solve(sample)
+        return {
+            "support": posture.support,
+            "base_position": posture.configuration[:3],
+            "base_quaternion": np.roll(posture.configuration[3:7], 1),
+            "wrench": posture.wrench,
+            **self.judge.label(sample, posture),
+        }
 
 
 @dataclass
@@ -71,7 +119,8 @@ def label_all(
     other machines, and yields the place and the file content of each. Raises `Interrupted` when `interrupted()` turns
     true, WorkerFailed when a worker fails in Python or cannot start, or when too many are killed."""
     folder.mkdir(parents=True, exist_ok=True)
-    chunks, paths = cut(indices, chunk_size, folder)
+    chunks = [list(indices[start : start + chunk_size]) for start in range(0, len(indices), chunk_size)]
+    paths = [folder / f"{number:05d}.shard" for number in range(len(chunks))]
     done = {number: shard for number, path in enumerate(paths) if (shard := read_shard(path, key, chunks[number]))}
     progress(sum(len(chunks[number]) for number in done), len(indices))
     missing = [number for number in range(len(chunks)) if number not in done]
@@ -195,7 +244,7 @@ def _label_chunk(solver: Labeller, indices: Sequence[int], crashed: Sequence[int
             continue
         current.value = index
         try:
-            labels[index] = solver.solve(index, sample)
+            labels[index] = solver.solve(sample)
         except Rejected as reason:
             rejected[index] = str(reason)
     current.value = IDLE

@@ -1,13 +1,16 @@
-"""The robot in pinocchio, with its arms locked to a sample."""
+"""The robot on two soles in pinocchio, with its arms locked to a sample; limits of the soles."""
 
+from dataclasses import dataclass
+from itertools import product
 from typing import Any, Literal
 
 import numpy as np
 import pinocchio
+from scipy.spatial import ConvexHull
 
 from iowbc.arrays import Array
 from iowbc.recipe.generator import PostureProblem
-from iowbc.reference.labels.sample import Sample
+from iowbc.robot import rotations
 from iowbc.robot.description import Robot
 
 BASE_RANGE = 10.0
@@ -16,9 +19,38 @@ ROOT = "root_joint"
 """Name that crocoddyl's floating-base actuation looks for."""
 
 
-def mean_stance(width: float) -> Array:
-    """Places of the sole centres on the ground, left and right, shape (2, 3) [m]."""
-    return np.array([[0.0, 0.5 * width, 0.0], [0.0, -0.5 * width, 0.0]])
+@dataclass(frozen=True)
+class Sample:
+    """One arm posture and base command."""
+
+    arm: Array
+    """Positions of the interaction branch, shape (14,) [rad]."""
+    command: Array
+    """Height [m] and torso pitch [rad], shape (2,)."""
+
+    @property
+    def height(self) -> float:
+        """Commanded height [m]."""
+        return float(self.command[0])
+
+    def torso_rotation(self) -> Array:
+        """Commanded torso orientation relative to the feet: a pitch about the lateral axis, shape (3, 3)."""
+        return rotations.matrix(rotations.from_euler(np.zeros(()), self.command[1], np.zeros(())))
+
+
+@dataclass(frozen=True)
+class Posture:
+    """A support posture in equilibrium on two soles."""
+
+    configuration: Array
+    """Reduced pinocchio configuration: base position, base quaternion xyzw, support joints, shape (22,)."""
+    wrench: Array
+    """Wrench of the ground on each sole in the sole's frame, force then moment, shape (2, 6) [N, N·m]."""
+
+    @property
+    def support(self) -> Array:
+        """Support joint positions, shape (15,) [rad]."""
+        return self.configuration[7:]
 
 
 def build_model(robot: Robot) -> Any:
@@ -38,6 +70,36 @@ def build_model(robot: Robot) -> Any:
     model.lowerPositionLimit = np.concatenate([np.full(3, -BASE_RANGE), np.full(4, -1.01), robot.lower])
     model.upperPositionLimit = np.concatenate([np.full(3, BASE_RANGE), np.full(4, 1.01), robot.upper])
     return model
+
+
+@dataclass(frozen=True)
+class SoleLimits:
+    """Limits of one flat sole: friction pyramid, centre of pressure in a rectangle, torsion, least load."""
+
+    friction: float
+    half_length: float
+    half_width: float
+    """Half sides of the rectangle for the centre of pressure [m]."""
+    smallest_load: float
+    """Least normal force [N]."""
+
+    def rows(self) -> tuple[Array, Array]:
+        """A and b of A f ≤ b for a wrench f (force, moment) in the sole's frame, shapes (17, 6) and (17,).
+
+        The friction coefficient is that of the pyramid inside the cone, μ/√2. The yaw rows bound the torsion that four
+        corner forces inside that pyramid can make (Caron, Pham, Nakamura, ICRA 2015).
+        """
+        x, y, mu = self.half_length, self.half_width, self.friction / np.sqrt(2.0)
+        pyramid = [[1, 0, -mu, 0, 0, 0], [-1, 0, -mu, 0, 0, 0], [0, 1, -mu, 0, 0, 0], [0, -1, -mu, 0, 0, 0]]
+        pressure = [[0, 0, -y, 1, 0, 0], [0, 0, -y, -1, 0, 0], [0, 0, -x, 0, 1, 0], [0, 0, -x, 0, -1, 0]]
+        torsion = [
+            [a * y, b * x, -mu * (x + y), -turn * a * mu, -turn * b * mu, -turn]
+            for turn, a, b in product((1.0, -1.0), repeat=3)
+        ]
+        rows = np.array([*pyramid, *pressure, *torsion, [0, 0, -1, 0, 0, 0]], dtype=np.float64)
+        bound = np.zeros(len(rows))
+        bound[-1] = -self.smallest_load
+        return rows, bound
 
 
 class SupportModel:
@@ -62,10 +124,22 @@ class SupportModel:
         self.base = self.model.getFrameId(robot.base)
         self._torso_joint = int(self.model.frames[self.torso].parentJoint)
         self._full_torso = self.full.getJointId(self.model.names[self._torso_joint])
-        self.stance = [pinocchio.SE3(np.eye(3), place) for place in mean_stance(problem.stance_width)]
+        centres = 0.5 * problem.stance_width * np.array([[0.0, 1.0, 0.0], [0.0, -1.0, 0.0]])
+        self.stance = [pinocchio.SE3(np.eye(3), centre) for centre in centres]
+        """Places of the left and of the right sole's centre on the ground."""
         margin = problem.limit_margin
         self.lower, self.upper = robot.lower[robot.support] + margin, robot.upper[robot.support] - margin
         self.effort = problem.effort_fraction * robot.effort[robot.support]
+        self.posture_weights = np.full(len(robot.support), problem.sagittal_weight)
+        """Weight w of ½ w (θ - θ_default)², shape (15,) [1/rad²]: waist, sagittal (axis across the body) or lateral."""
+        self.posture_weights[robot.lateral] = problem.lateral_weight
+        self.posture_weights[robot.waist] = problem.waist_weight
+        half_length, half_width = problem.sole_fraction * np.abs(robot.sole_polygon).min(axis=(0, 1))
+        self.limits = SoleLimits(problem.friction, float(half_length), float(half_width), problem.smallest_load)
+        """Limits of either sole: the rectangle inside the contact points, shrunk by the recipe."""
+        corners = robot.sole_polygon + centres[:, None, :2]
+        edges = np.unique(ConvexHull(corners.reshape(-1, 2)).equations.round(12), axis=0)
+        self._inward, self._offset = -edges[:, :2], -edges[:, 2]  # distance inside an edge: normal · point + offset
 
     def lock(self, sample: Sample) -> None:
         """Adds the inertia of the arms in their posture to the torso."""
@@ -95,6 +169,10 @@ class SupportModel:
         q[:3] = -0.5 * (soles[0] + soles[1])
         return q
 
+    def margin(self, point: Array) -> Array:
+        """Distance of points (..., 2) to the nearest edge of both soles' convex hull, positive inside [m]."""
+        return (point @ self._inward.T + self._offset).min(axis=-1)
+
     def rest(self, sample: Sample) -> Array:
         """Reference of the posture cost, (22,): default posture, with part of the commanded pitch in the waist."""
         q = self.start()
@@ -111,11 +189,3 @@ def ground_forces(model: Any, soles: list[int], wrench: Array) -> Any:
         frame = model.frames[sole]
         forces[frame.parentJoint] = frame.placement.act(pinocchio.Force(values))
     return forces
-
-
-def posture_weights(robot: Robot, problem: PostureProblem) -> Array:
-    """Weight w of ½ w (θ - θ_default)², shape (15,) [1/rad²]: waist, sagittal (axis across the body) or lateral."""
-    weights = np.full(len(robot.support), problem.sagittal_weight)
-    weights[robot.lateral] = problem.lateral_weight
-    weights[robot.waist] = problem.waist_weight
-    return weights

@@ -12,7 +12,7 @@ from matplotlib.patches import Patch
 from iowbc.arrays import Array
 from iowbc.control.feasible_map import FeasibleMap
 from iowbc.recipe.generator import FitGates
-from iowbc.reference.fit.task_error import TaskErrors
+from iowbc.reference.fit.errors import TaskErrors
 from iowbc.reference.labels.checks import MethodComparison
 from iowbc.reference.labels.dataset import Dataset
 from iowbc.reference.labels.plan import SamplePlan

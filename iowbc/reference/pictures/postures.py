@@ -9,11 +9,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from iowbc.errors import Rejected
-from iowbc.reference.labels.gates import LabelChecker
+from iowbc.reference.labels.checks import LabelChecker
+from iowbc.reference.labels.gauss_newton import StaticMethod
 from iowbc.reference.labels.plan import SamplePlan
-from iowbc.reference.labels.sample import Posture, Sample
-from iowbc.reference.labels.static import StaticMethod
-from iowbc.reference.labels.support_model import SupportModel
+from iowbc.reference.labels.support_model import Posture, Sample, SupportModel
 from iowbc.results.picture import write_figure
 from iowbc.robot.description import Robot
 from iowbc.sim.rendering.offscreen import Image, Offscreen

@@ -12,14 +12,11 @@ from iowbc.control.generator import ReferenceNetwork
 from iowbc.errors import Interrupted
 from iowbc.pipeline.stage import Job
 from iowbc.recipe.generator import Fit, FitGates, ReferenceGenerator, SmoothnessCheck
-from iowbc.reference.fit.fitting import FitData, fit
-from iowbc.reference.fit.gates import check_fit, measure_jumps
-from iowbc.reference.fit.preparation import split_by_group
-from iowbc.reference.fit.task_error import TaskErrors, TaskKinematics
+from iowbc.reference.fit.errors import TaskErrors, check_fit, measure_jumps, task_errors, task_jacobian
+from iowbc.reference.fit.fitting import FitData, fit, split_by_group
 from iowbc.reference.labels.dataset import Dataset
-from iowbc.reference.labels.sample import Sample
-from iowbc.reference.labels.static import StaticMethod
-from iowbc.reference.labels.support_model import SupportModel
+from iowbc.reference.labels.gauss_newton import StaticMethod
+from iowbc.reference.labels.support_model import Sample, SupportModel
 
 
 def toy(count: int, seed: int) -> FitData:
@@ -86,16 +83,9 @@ def test_too_few_samples_to_split_are_named() -> None:
         split_by_group(np.array([0, 1, 1]), 0.05, 0.1, seed=0)
 
 
-@pytest.fixture(scope="module")
-def kinematics(support: SupportModel) -> TaskKinematics:
-    return TaskKinematics(support)
-
-
-def test_a_label_has_no_task_error(
-    support: SupportModel, kinematics: TaskKinematics, command: Callable[..., Sample]
-) -> None:
+def test_a_label_has_no_task_error(support: SupportModel, command: Callable[..., Sample]) -> None:
     sample = command(0.62, 0.45)
-    errors = kinematics.errors([sample], StaticMethod(support).solve(sample).support[None])
+    errors = task_errors(support, [sample], StaticMethod(support).solve(sample).support[None])
     assert abs(errors.height[0]) < 2e-3
     assert abs(errors.pitch[0]) < 5e-3
     assert errors.foot[0] < 1e-4
@@ -104,7 +94,7 @@ def test_a_label_has_no_task_error(
 
 
 def test_a_longer_leg_lifts_spreads_and_tilts(
-    robot: Any, support: SupportModel, kinematics: TaskKinematics, command: Callable[..., Sample]
+    robot: Any, support: SupportModel, command: Callable[..., Sample]
 ) -> None:
     sample = command(0.62, 0.2)
     posture = StaticMethod(support).solve(sample).support
@@ -116,24 +106,22 @@ def test_a_longer_leg_lifts_spreads_and_tilts(
         both[names.index(f"{side}_ankle_pitch_joint")] += 0.05
     one = posture.copy()
     one[names.index("left_ankle_pitch_joint")] += 0.02
-    before, after, uneven = (kinematics.errors([sample], q[None]) for q in (posture, both, one))
+    before, after, uneven = (task_errors(support, [sample], q[None]) for q in (posture, both, one))
     assert after.height[0] > before.height[0] + 0.01
     assert after.foot[0] < 1e-3
     assert uneven.foot_rotation[0] == pytest.approx(0.01, rel=0.02)
     assert uneven.foot[0] > 1e-4
 
 
-def test_the_task_jacobian_is_the_derivative(
-    support: SupportModel, kinematics: TaskKinematics, command: Callable[..., Sample]
-) -> None:
+def test_the_task_jacobian_is_the_derivative(support: SupportModel, command: Callable[..., Sample]) -> None:
     sample = command(0.62, 0.3)
     label = StaticMethod(support).solve(sample)
-    jacobian = kinematics.jacobian(sample, label.configuration)
+    jacobian = task_jacobian(support, sample, label.configuration)
     step, random = 1e-5, np.random.default_rng(0)
     for _ in range(10):
         direction = random.normal(size=15)
-        ahead = kinematics.errors([sample], (label.support + step * direction)[None])
-        behind = kinematics.errors([sample], (label.support - step * direction)[None])
+        ahead = task_errors(support, [sample], (label.support + step * direction)[None])
+        behind = task_errors(support, [sample], (label.support - step * direction)[None])
         predicted = jacobian @ direction
         assert (ahead.height[0] - behind.height[0]) / (2 * step) == pytest.approx(predicted[6], abs=2e-3)
         foot = step * np.linalg.norm(predicted[:3])
@@ -197,6 +185,6 @@ def test_predictions_are_placed_on_both_soles(support: SupportModel, command: Ca
     sample = command(0.66, 0.1)
     label = StaticMethod(support).solve(sample)
     com = pinocchio.centerOfMass(support.model, support.data, label.configuration)
-    margin = TaskKinematics(support).errors([sample], label.support[None]).margin[0]
+    margin = task_errors(support, [sample], label.support[None]).margin[0]
     assert margin == pytest.approx(0.0, abs=0.2)
     assert np.abs(com[:2]).max() < 0.01

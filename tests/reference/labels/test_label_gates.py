@@ -9,10 +9,9 @@ import pytest
 
 from iowbc.errors import Rejected
 from iowbc.recipe.generator import LabelGates, ReferenceGenerator
-from iowbc.reference.labels.gates import LabelChecker
-from iowbc.reference.labels.sample import Posture, Sample
-from iowbc.reference.labels.static import StaticMethod
-from iowbc.reference.labels.support_model import SupportModel
+from iowbc.reference.labels.checks import LabelChecker
+from iowbc.reference.labels.gauss_newton import StaticMethod
+from iowbc.reference.labels.support_model import Posture, Sample, SupportModel
 
 
 @pytest.fixture(scope="module")

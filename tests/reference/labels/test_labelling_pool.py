@@ -15,8 +15,8 @@ from reference_doubles import DoubleTask
 from stage_jobs import Backwards
 
 from iowbc.errors import Interrupted, WorkerFailed
+from iowbc.reference.labels.dataset import Shard, read_shard
 from iowbc.reference.labels.pool import CRASHED, _on_death, _Queue, _Worker, label_all
-from iowbc.reference.labels.shards import Shard, read_shard
 from iowbc.stages.rg_dataset import label_everywhere
 
 COUNT, CHUNK = 40, 8

@@ -6,7 +6,7 @@ import pinocchio
 import pytest
 
 from iowbc.recipe.generator import ReferenceGenerator
-from iowbc.reference.labels.gates import SelfCollision
+from iowbc.reference.labels.checks import SelfCollision
 from iowbc.reference.labels.support_model import SupportModel
 from iowbc.robot.description import Robot
 

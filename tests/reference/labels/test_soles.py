@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from iowbc.recipe.generator import ReferenceGenerator
-from iowbc.reference.labels.soles import SoleLimits, support_edges, support_margin
+from iowbc.reference.labels.support_model import SoleLimits, SupportModel
 from iowbc.robot.description import Robot
 
 LIMITS = SoleLimits(friction=0.5 * np.sqrt(2.0), half_length=0.1, half_width=0.03, smallest_load=20.0)
@@ -51,12 +51,13 @@ def test_any_set_of_corner_forces_inside_the_pyramid_is_carried() -> None:
         assert allowed(*wrench)
 
 
-def test_the_margin_is_the_distance_to_the_nearest_edge_of_both_soles(robot: Robot, recipe: ReferenceGenerator) -> None:
-    edges = support_edges(robot, recipe.problem)
+def test_the_margin_is_the_distance_to_the_nearest_edge_of_both_soles(
+    robot: Robot, recipe: ReferenceGenerator, support: SupportModel
+) -> None:
     half = 0.5 * recipe.problem.stance_width + np.abs(robot.sole_polygon[..., 1]).max()
     front = robot.sole_polygon[..., 0].max()
-    assert support_margin(edges, np.zeros(2)) == pytest.approx(front, abs=2e-3)
-    assert support_margin(edges, np.array([front - 0.01, 0.0])) == pytest.approx(0.01, abs=1e-9)
-    assert support_margin(edges, np.array([0.05, half + 0.1])) < -0.05
+    assert support.margin(np.zeros(2)) == pytest.approx(front, abs=2e-3)
+    assert support.margin(np.array([front - 0.01, 0.0])) == pytest.approx(0.01, abs=1e-9)
+    assert support.margin(np.array([0.05, half + 0.1])) < -0.05
     points = np.random.default_rng(0).normal(size=(5, 2))
-    np.testing.assert_allclose(support_margin(edges, points), [support_margin(edges, point) for point in points])
+    np.testing.assert_allclose(support.margin(points), [support.margin(point) for point in points])

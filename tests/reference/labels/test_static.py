@@ -12,9 +12,8 @@ from iowbc.errors import Rejected
 from iowbc.pipeline.stage import Job
 from iowbc.recipe.generator import PostureProblem, ReferenceGenerator
 from iowbc.reference.labels.dataset import Dataset
-from iowbc.reference.labels.sample import Posture, Sample
-from iowbc.reference.labels.static import StaticMethod
-from iowbc.reference.labels.support_model import SupportModel, ground_forces, posture_weights
+from iowbc.reference.labels.gauss_newton import StaticMethod
+from iowbc.reference.labels.support_model import Posture, Sample, SupportModel, ground_forces
 from iowbc.robot.description import Robot
 from iowbc.robot.mirror import interaction_mirror, support_mirror
 
@@ -111,7 +110,7 @@ def cost(method: StaticMethod, support: SupportModel, sample: Sample, posture: P
         + problem.height_weight * (height - sample.height) ** 2
         + problem.torso_weight * (turn @ turn)
         + problem.torque_weight * (torque @ torque)
-        + posture_weights(support.robot, problem) @ (q[7:] - rest) ** 2
+        + support.posture_weights @ (q[7:] - rest) ** 2
     )
 
 
