@@ -57,11 +57,11 @@ def status(as_json: options.AsJson = False, runs: options.RunsFolder = options.R
         tell(console, f"nothing has run in {store.runs.root} yet; `iowbc run RECIPE` starts")
     if aside := sorted(store.runs.damaged.glob(f"{DAMAGED_LINE}*")):
         text = f"{len(aside)} damaged lines of MLflow's journals were put aside, as {shown_path(aside[-1])}"
-        console.print(text, highlight=False)
+        console.print(text, markup=False, highlight=False)
     if waiting := backlog(store.runs):
         log = shown_path(store.runs.tracking / "sender.log")
         text = f"MLflow lacks something of {len(waiting)} runs; the next run sends it (its log: {log})"
-        console.print(text, highlight=False)
+        console.print(text, markup=False, highlight=False)
 
 
 def _readable_recipes(store: Store) -> list[str]:

@@ -154,7 +154,7 @@ class PointProcess:
 def _run(task: PointRun, parent: int, saying: Connection) -> None:
     os.setpgid(0, 0)  # Ctrl-C reaches only the sweep, which forwards it once
     die_with_parent(parent)
-    log = os.open(task.log, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
+    log = os.open(task.log, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
     for descriptor in (1, 2):
         os.dup2(log, descriptor)
     os.close(log)

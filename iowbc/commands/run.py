@@ -18,7 +18,7 @@ from iowbc.commands.results import main_tables, print_results
 from iowbc.errors import Interrupted, PipelineFailed, UsageError
 from iowbc.pipeline.console.display import Display, LiveTable, PlainDisplay
 from iowbc.pipeline.planner import Planner
-from iowbc.pipeline.runner import Runner
+from iowbc.pipeline.runner import Runner, run_here
 from iowbc.pipeline.stage_plan import Options
 from iowbc.pipeline.stop_request import StopRequest
 from iowbc.pipeline.store.runs import Runs, require_writable_runs
@@ -149,9 +149,8 @@ def run_recipe(
         try:
             tracker = Tracker(request.runs, loaded, within) if loaded.recipe.execution.track else None
             display = _display(loaded, console, lambda: stop.text, manner)
-            runner = Runner(planner, display, tracker, stop, rest, workers=workers)
-            if cluster is not None:
-                runner.execute = cluster.run
+            execute = run_here if cluster is None else cluster.run
+            runner = Runner(planner, display, tracker, stop, rest, execute, workers)
             runner.run()
             status, ending = "FINISHED", RunEnding(DONE, artifacts=runner.artifacts)
             if tracker is not None:

@@ -129,7 +129,7 @@ def write_skill(
     statement = SkillContract(
         frequency=recipe.skill.frequency,
         observation=observations.shape[1],
-        sees_object=recipe.task.observation.observe_object and recipe.distill.observe_object,
+        sees_object=recipe.student_sees_object,
         robot=recipe.skill.robot,
         commands=recipe.task.commands,
         sources=dict(sources),

@@ -59,6 +59,11 @@ class StageReport:
         self.display.say(prefix + text.removeprefix(prefix))
 
 
+def run_here(stage: Stage, job: Job) -> None:
+    """Run a stage in this process."""
+    stage.run(job)
+
+
 @dataclass(eq=False)
 class Runner:
     """One run of a recipe."""
@@ -69,7 +74,7 @@ class Runner:
     interrupted: Callable[[], bool]
     command: Callable[[], str] = lambda: ""
     """Command that resumes this run after the stages in `made`; recorded with each stage while it runs."""
-    execute: Callable[[Stage, Job], None] = lambda stage, job: stage.run(job)
+    execute: Callable[[Stage, Job], None] = run_here
     """Runs a stage: here, or on a cluster with the same result."""
     workers: int = 0
     """Worker processes of a stage if neither options nor recipe set them; 0: one per core."""

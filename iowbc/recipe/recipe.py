@@ -29,12 +29,14 @@ SEEDS = ("seed", "teacher.seed", "distill.seed", "skill.learning.seed")
 """Dotted paths of the seeds, which distinguish repetitions of an experiment."""
 NAME = "[a-z0-9][a-z0-9_-]*"
 """Pattern of an experiment's name, which is also used in file names."""
+LONGEST_NAME = 64
+"""Maximum length of such a name [characters]."""
 
 
 class Recipe(Section):
     """One experiment."""
 
-    name: str = Field(pattern=f"^{NAME}$", max_length=64)
+    name: str = Field(pattern=f"^{NAME}$", max_length=LONGEST_NAME)
     """Name of the experiment: up to 64 lower-case letters, digits, `-` and `_`."""
     description: str = ""
     """Purpose of the experiment, in a sentence."""
@@ -59,6 +61,11 @@ class Recipe(Section):
         """The recipe for a policy that does not observe s_priv: without custom parts of s_priv."""
         observation = self.task.observation.model_copy(update={"own": {}})
         return self.model_copy(update={"task": self.task.model_copy(update={"observation": observation})})
+
+    @property
+    def student_sees_object(self) -> bool:
+        """True if the deployed policy observes the object: a distilled student may lack it."""
+        return self.task.observation.observe_object and (self.distill.observe_object or "distill" not in self.stages)
 
     def problems(self) -> Problems:
         student = self.distill

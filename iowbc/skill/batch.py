@@ -56,7 +56,7 @@ class GameBatch:
         self._human = Human(self._skill, n, period)
         self._hands = HandForces(self.lower.robot, self.lower.guidance.references, n, self._skill.robot.history)
         self._figures = EpisodeFigures(n, (int(self._limit.max()) + 1) * self.substeps)
-        self._sees_object = recipe.task.observation.observe_object and recipe.distill.observe_object
+        self._sees_object = recipe.student_sees_object
         self.origin = Origin(np.zeros((n, 3)), np.zeros(n))
         self._episode, self._decisions, self._touched = np.zeros((3, n), np.int64)
         self._total, self._potential = np.zeros((2, n))

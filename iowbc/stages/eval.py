@@ -46,13 +46,15 @@ def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
 
 
 def defaults(recipe: Recipe) -> dict[str, object]:
-    """The command sequences of sweeps and cases that have none in the recipe."""
-    if recipe.eval.sequence:
-        return {}
-    return {
-        f"defaults.{name}_sequence": [deciding(segment) for segment in sequence]
-        for name, sequence in (("lifting", LIFTING), ("pushing", PUSHING))
-    }
+    """The command sequences of sweeps and cases that have none in the recipe, and the length of the history in which
+    the load of a policy without one is probed."""
+    found: dict[str, object] = {}
+    if not recipe.eval.sequence:
+        for name, sequence in (("lifting", LIFTING), ("pushing", PUSHING)):
+            found[f"defaults.{name}_sequence"] = [deciding(segment) for segment in sequence]
+    if recipe.eval.probe is not None and recipe.eval.policy == "teacher" and recipe.teacher.history is None:
+        found["distill.history"] = recipe.distill.history
+    return found
 
 
 def run(job: Job) -> None:

@@ -174,9 +174,12 @@ def test_neither_the_number_of_workers_nor_other_machines_change_anything(
     spread = Backwards()
     elsewhere = partial(play_everywhere, spread, recipe, evaluate.read_by_trials(done))
     world, policy = Specification(recipe, done.robot), load_policy(student)
+    reports: list[tuple[float, float]] = []
     protocol = Protocol(world, policy, work=tmp_path, workers=0, elsewhere=elsewhere)
+    protocol.progress = lambda ready, total, note: reports.append((ready, total))
     pd.testing.assert_frame_equal(protocol.run(), pd.read_parquet(done.out / "trials.parquet"))
     assert spread.calls == len(list(done.work.glob("*.batch")))
+    assert [ready for ready, _ in reports] == sorted({ready for ready, _ in reports}), "progress never goes back"
 
 
 def test_a_damaged_batch_is_played_again(done: Job, recipe: Recipe, student: Path, tmp_path: Path) -> None:

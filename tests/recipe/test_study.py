@@ -47,6 +47,8 @@ def test_what_is_wrong_is_named_with_its_place(folder: Path) -> None:
     assert r"'a\x00b' is no recipe's name" in refused(folder, 'variants: [full, "a\\0b"]\n')
     assert "paper.yaml:1:12: key 'variants': 3 is no recipe's name" in refused(folder, "variants: [3, full]\n")
     assert "full is the name of more than one" in refused(folder, "variants: [full, full]\n")
+    assert "1:1: key 'name' = 'aaa" in refused(folder, f"name: {65 * 'a'}\nvariants: [full, wo_rg]\n")
+    assert "1:1: key 'description': should be a" in refused(folder, "description: [1]\nvariants: [full, wo_rg]\n")
 
 
 def test_a_variant_that_is_missing_is_told_as_an_extended_recipe_is(folder: Path) -> None:
@@ -67,5 +69,5 @@ def test_what_a_recipe_extends_may_lie_beside_it_and_be_named_as_variants_are(fo
 
 
 def test_a_file_whose_name_is_no_recipes_is_told_so(folder: Path) -> None:
-    with pytest.raises(RecipeError, match=r"My study\.yaml:1:1: key 'name' = 'my study': lower-case letters"):
+    with pytest.raises(RecipeError, match=r"My study\.yaml:1:1: key 'name' = 'my study': up to 64 lower-case letters"):
         load_study(write(folder, "variants: [full, wo_rg]\n", "My study.yaml"))

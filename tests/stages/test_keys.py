@@ -156,3 +156,22 @@ def test_the_default_sequences_are_in_the_key_of_an_evaluation_that_names_none(m
     assert STAGES["eval"].defaults(own) == {}
     monkeypatch.setattr(evaluate, "LIFTING", evaluate.LIFTING[:-1])
     assert data_digest(dict(STAGES["eval"].defaults(recipe))) != before
+
+
+def test_the_probed_history_of_a_policy_without_one_is_in_the_key() -> None:
+    def probed(policy: str, **teacher: object) -> bool:
+        given = {"name": "x", "eval": {"policy": policy, "probe": {}}, "teacher": teacher}
+        return "distill.history" in STAGES["eval"].defaults(Recipe.model_validate(given))
+
+    assert probed("teacher")
+    assert not probed("student")
+    assert not probed("teacher", history={})
+
+
+def test_a_student_that_ppo_trained_observes_what_the_task_shows() -> None:
+    def sees(*stages: str) -> bool:
+        given = {"name": "x", "stages": ["teacher", *stages], "distill": {"observe_object": False}}
+        return Recipe.model_validate(given).student_sees_object
+
+    assert not sees("distill")
+    assert sees()

@@ -199,6 +199,8 @@ def test_each_environment_climbs_by_itself(make: Make) -> None:
 def test_the_levels_set_load_and_disturbances(make: Make) -> None:
     env = make(num_envs=2, changes={"task.commands.standing_episodes": 1.0, "task.scenes.free": 0.0})
     env.set_attr("level", 2.0, indices=1)
+    with pytest.raises(ValueError, match="no axis 'speed'; there are posture, locomotion, "):
+        env.set_attr("level", {"speed": 1.0})
     env.reset()
     drawn = env.drawn()
     assert drawn["load_scale"].tolist() == pytest.approx([0.15, 1.3])

@@ -151,7 +151,8 @@ class Protocol:
             content = played(self.world, self.policy, trials, self.workers, self.interrupted, progress)
             write_checked(path, name, content)
         self.done += len(trials)
-        self.progress(self.done, self.total, suites)
+        if self.elsewhere is None:
+            self.progress(self.done, self.total, suites)
         return pd.read_parquet(BytesIO(content))
 
 

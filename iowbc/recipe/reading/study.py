@@ -7,7 +7,7 @@ from pathlib import Path
 from iowbc.errors import Problem, RecipeError, shown
 from iowbc.recipe.reading.document import Located, plain, read_document
 from iowbc.recipe.reading.loading import LoadedRecipe, file_meant_in, load_recipe, read_text, recipe_file
-from iowbc.recipe.recipe import NAME
+from iowbc.recipe.recipe import LONGEST_NAME, NAME
 
 MOST_VARIANTS = 100
 """Largest number of variants of a study."""
@@ -29,10 +29,12 @@ def load_study(word: str | Path, overrides: Sequence[str] = ()) -> tuple[LoadedR
         if key not in KEYS
     ]
     name = entries["name"].value if "name" in entries else file.stem.lower()
-    if not isinstance(name, str) or not re.fullmatch(NAME, name):
+    if not isinstance(name, str) or not re.fullmatch(NAME, name) or len(name) > LONGEST_NAME:
         place = entries["name"].place if "name" in entries else tree.place
-        text = f"key 'name' = {shown(name)}: lower-case letters, digits, `-` and `_`; in quotes what reads as a number"
-        problems.append(Problem(place, text))
+        text = f"up to {LONGEST_NAME} lower-case letters, digits, `-` and `_`; in quotes what reads as a number"
+        problems.append(Problem(place, f"key 'name' = {shown(name)}: {text}"))
+    if "description" in entries and not isinstance(entries["description"].value, str):
+        problems.append(Problem(entries["description"].place, "key 'description': should be a sentence"))
     found = _files(entries["variants"], file, problems)
     if problems:
         raise RecipeError(problems)

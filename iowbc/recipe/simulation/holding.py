@@ -87,7 +87,6 @@ def held_delay_problems(section: Section, path: str, simulation: SimulationSetti
     felt = simulation.partner.longest_delay, "the longest of simulation.partner.delay and .lagging.delay"
     limits: dict[str, tuple[float, str]] = dict.fromkeys(LATENCIES, buffered) | {"partner_delay": felt}
     for place, held in marked_fields(section, path, HELD):
-        for name in limits.keys() & held.keys():
-            limit, source = limits[name]
-            if held[name] > limit:
+        for name, (limit, source) in limits.items():
+            if name in held and held[name] > limit:
                 yield place, f"{name}: {held[name]:g} is above {limit:g}, {source}"

@@ -210,9 +210,8 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
             return [dict(zip(AXES, level, strict=True)) for level in self._levels()[list(rows)].tolist()]
         if attr_name in ("observation_space", "action_space", "layout"):
             return [getattr(self, attr_name) for _ in rows]
-        raise AttributeError(
-            f"environments have no attribute {attr_name!r}; there are scene, level, layout, render_mode"
-        )
+        names = "scene, level, layout, observation_space, action_space, render_mode"
+        raise AttributeError(f"environments have no attribute {attr_name!r}; there are {names}")
 
     def set_attr(self, attr_name: str, value: Any, indices: Indices = None) -> None:
         """Sets the curriculum `level`, from the next episodes on: a number for all axes, or numbers of some by name."""
@@ -222,6 +221,8 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
         rows = list(self._get_indices(indices))
         axes = value if isinstance(value, Mapping) else dict.fromkeys(AXES, value)
         for axis, level in axes.items():
+            if axis not in AXES:
+                raise ValueError(f"the curriculum has no axis {axis!r}; there are {', '.join(AXES)}")
             levels[rows, AXES.index(axis)] = level
         self._set_levels(levels)
 
