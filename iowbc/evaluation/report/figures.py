@@ -33,6 +33,8 @@ PANEL_WIDTH, SMALLEST_WIDTH = 3.75, 7.5
 """Width of a panel of the comparison, and minimum width of the whole figure [inch]."""
 VARIANTS_PER_PANEL = 4
 """Number of variants whose bars fit into a panel of `PANEL_WIDTH`; with more, it is wider."""
+CASES_PER_ROW, ROW_HEIGHT = 10, 3.8
+"""Cases side by side in the figure of robustness, and height of its rows [inch]."""
 SUITES_PER_PANEL = 3
 """Number of suites whose capacities fit into a panel."""
 LONGEST_TEXT = 5
@@ -79,7 +81,9 @@ def comparison(summary: pd.DataFrame, capacity_rate: float) -> Figure:
     carrying = [suite for suite in suites_of(summary, *SWEPT) if suite in carried]
     bars = max(1.0, len(variants_of(summary)) / VARIANTS_PER_PANEL)
     widths = [*(1.0 for _ in sweeps), *[bars * max(1.0, len(carrying) / SUITES_PER_PANEL)] * bool(carrying), bars]
-    figure, panels = _row(PANEL_WIDTH, widths, ConstrainedLayoutEngine(wspace=0.06))
+    size = max(PANEL_WIDTH * sum(widths), SMALLEST_WIDTH), 4.2
+    figure = Figure(figsize=size, layout=ConstrainedLayoutEngine(wspace=0.06))
+    panels = list(figure.subplots(1, len(widths), squeeze=False, width_ratios=widths).flat)
     for axes, suite in zip(panels, sweeps, strict=False):
         chosen = summary[summary["suite"] == suite]
         still = error_norm(chosen[[f"still_{name}" for name in ERRORS]].mean().to_numpy())
@@ -97,16 +101,22 @@ def comparison(summary: pd.DataFrame, capacity_rate: float) -> Figure:
 
 def robustness(summary: pd.DataFrame, rate: float) -> Figure:
     """Success in the robustness and stagnation suites, and the impulse on the base survived by direction."""
-    suites = suites_of(summary, "robustness", "stagnation")
     pushes = summary[summary["kind"] == "pushes"]
-    shown = [*suites, *suites_of(summary, "pushes")]
-    widths = [float(max(2, summary.loc[summary["suite"] == suite, "case"].nunique())) for suite in shown]
-    figure, panels = _row(1.2 * max(1.0, len(variants_of(summary)) / VARIANTS_PER_PANEL), widths, "constrained")
-    for axes, suite in zip(panels, suites, strict=False):
-        _success_panel(axes, summary[summary["suite"] == suite], f"success, {suite}")
-    if len(pushes):
-        _capacity_bars(panels[-1], push_capacities(summary, rate), list(dict.fromkeys(pushes["case"])))
-        panels[-1].set(title=f"impulse survived, {masses_of(pushes)}", ylabel="impulse [N·s]")
+    parts = []
+    for suite in suites_of(summary, "robustness", "stagnation", "pushes"):
+        chosen = summary[summary["suite"] == suite]
+        row = pd.factorize(chosen["case"])[0] // CASES_PER_ROW
+        parts += [chosen[row == place] for place in range(row.max() + 1)]
+    width = 1.2 * CASES_PER_ROW * max(1.0, len(variants_of(summary)) / VARIANTS_PER_PANEL)
+    figure = Figure(figsize=(width, ROW_HEIGHT * len(parts)), layout="constrained")
+    panels = list(figure.subplots(len(parts), 1, squeeze=False).flat)
+    for axes, chosen in zip(panels, parts, strict=True):
+        if (chosen["kind"] == "pushes").all():
+            _capacity_bars(axes, push_capacities(summary, rate), list(dict.fromkeys(chosen["case"])))
+            axes.set(title=f"impulse survived, {masses_of(pushes)}", ylabel="impulse [N·s]")
+        else:
+            _success_panel(axes, chosen, f"success, {chosen['suite'].iloc[0]}")
+        axes.set_xlim(-0.6, CASES_PER_ROW - 0.4)
     return finish(figure, panels, "", panels[0])
 
 
@@ -156,12 +166,6 @@ def tidy(axes: Axes) -> None:
     _from_zero(axes)
     axes.grid(True, color="0.9")
     axes.spines[["top", "right"]].set_visible(False)
-
-
-def _row(panel: float, widths: Sequence[float], layout: Any) -> tuple[Figure, list[Axes]]:
-    """Figure with panels side by side; `panel`: unit of `widths` [inch]."""
-    figure = Figure(figsize=(max(panel * sum(widths), SMALLEST_WIDTH), 4.2), layout=layout)
-    return figure, list(figure.subplots(1, len(widths), squeeze=False, width_ratios=widths).flat)
 
 
 def _note(with_paper: bool) -> str:
