@@ -278,7 +278,7 @@ def test_ppo_of_the_students_network_leaves_a_policy_that_needs_nothing_privileg
     teacher.STAGE.run(job := make_job(tmp_path, recipe, workers=0))
     policy = load_policy(job.out)
     assert isinstance(policy, StudentPolicy)
-    assert policy.length == 5
+    assert policy.network.history == 5
     assert leaves_student(recipe)
     refused = [text for stage in (distill.STAGE, evaluate.STAGE, export.STAGE) for _, text in stage.problems(recipe)]
     assert len(refused) == 1
