@@ -1,4 +1,4 @@
-"""Proximal policy optimisation: settings that the controller's training and the skill's have in common; the skill's."""
+"""Proximal policy optimisation: settings that controller and skill have in common, and those of the skill alone."""
 
 from typing import Literal
 
