@@ -64,7 +64,7 @@ def skill_to_play(store: Store, word: str, stage: str | None, plan: Run = UNPLAN
 
 
 def _finished(store: Store, word: str) -> Run:
-    """What a word names; nothing for a folder, and where a first training has nothing finished yet."""
+    """The run that a word names; an empty one for a folder, and while no stage has finished."""
     if not os.path.isdir(word):
         with contextlib.suppress(UsageError):
             return named(store, word)

@@ -1,5 +1,4 @@
-"""Learning curves: a file with one line of JSON per update beside the checkpoint, a table and a figure
-whose panels have titles with units."""
+"""Learning curves: one line of JSON per update beside the checkpoint, a table, and a figure with units in titles."""
 
 import json
 from collections.abc import Mapping, Sequence

@@ -29,7 +29,7 @@ from iowbc.learning.normalization import Normalization
 from iowbc.learning.perceptron import Perceptron
 from iowbc.learning.policy import ActorCritic, acting_part
 from iowbc.learning.rollout import Samples, advantages, drawn_leaders, without_common_part
-from iowbc.recipe.ppo import SkillLearning
+from iowbc.recipe.skill.learning import SkillLearning
 from iowbc.recipe.teacher import Teacher
 from iowbc.rollouts.blocks import block_size
 from iowbc.rollouts.rollout import ExploringPolicy, Trajectories

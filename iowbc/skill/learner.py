@@ -13,7 +13,7 @@ from iowbc.learning.gaussian import divergence, entropy, log_density
 from iowbc.learning.policy import VALUE_GAIN
 from iowbc.learning.ppo import adapted, explained_variance
 from iowbc.learning.rollout import advantages
-from iowbc.recipe.ppo import SkillLearning
+from iowbc.recipe.skill.learning import SkillLearning
 from iowbc.skill.game import HUMAN, ROBOT, Observed, TransportGame
 from iowbc.skill.trained import Trained, mean_actions
 

@@ -13,7 +13,7 @@ from iowbc.learning.checkpoint import Arrays, prefixed, under
 from iowbc.learning.networks import TeacherNetwork
 from iowbc.learning.normalization import Normalization
 from iowbc.learning.policy import HIDDEN_GAIN
-from iowbc.recipe.ppo import SkillLearning
+from iowbc.recipe.skill.learning import SkillLearning
 
 
 class Trained:

@@ -7,7 +7,7 @@ import pytest
 import torch
 from pulling_game import DECISIONS, PullingGame
 
-from iowbc.recipe.ppo import SkillLearning
+from iowbc.recipe.skill.learning import SkillLearning
 from iowbc.skill.learner import SkillTraining
 
 GAMES, ROLLOUT = 32, 2 * DECISIONS

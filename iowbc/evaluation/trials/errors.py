@@ -1,4 +1,4 @@
-"""How a trial follows its commands: the paper's tracking errors (eq. 9), means of absolute deviations; transport."""
+"""Tracking of the commands in a trial: mean absolute errors (paper eq. 9), and the fraction of the path covered."""
 
 from typing import NamedTuple
 

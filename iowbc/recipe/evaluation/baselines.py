@@ -7,7 +7,7 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat
 from iowbc.recipe.beside import ModuleFile
 from iowbc.recipe.section import COSMETIC, Problems, Section
 
-Share = Annotated[float, Field(gt=0, le=1)]
+PositiveShare = Annotated[float, Field(gt=0, le=1)]
 
 
 class Tracking(Section):
@@ -65,7 +65,7 @@ class ModelBased(Section):
     estimation: Estimation = Estimation()
     friction: PositiveFloat = 0.5
     """Friction coefficient of the soles in the program; the smallest that the simulation draws."""
-    sole_fraction: Share = 0.9
+    sole_fraction: PositiveShare = 0.9
     """Fraction of the sole's rectangle within which each centre of pressure stays."""
     smallest_load: NonNegativeFloat = 20.0
     """Smallest normal force on each foot [N]."""
@@ -73,9 +73,9 @@ class ModelBased(Section):
     """Distance kept from joint limits [rad]."""
     limit_time: PositiveFloat = 0.1
     """Time within which no joint may reach its limit at the planned acceleration [s]."""
-    effort_fraction: Share = 0.95
+    effort_fraction: PositiveShare = 0.95
     """Fraction of the torque limits that the program may use."""
-    linkage_share: Share = 0.9
+    linkage_share: PositiveShare = 0.9
     """Fraction of a linkage's torque available to either of its two joints alone. Otherwise a waist that pitches under
     a load would have no roll torque left against falling sideways."""
     stop_torque: NonNegativeFloat = 60.0

@@ -5,10 +5,10 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, PositiveFloat
 
-from iowbc.recipe.ppo import SkillLearning
 from iowbc.recipe.section import COSMETIC, LATER, ArtifactName, Ascending, Distinct, Problems, Section, Share
 from iowbc.recipe.simulation.holding import ObjectScene
 from iowbc.recipe.simulation.partner import BEHAVIOURS, Behaviour
+from iowbc.recipe.skill.learning import SkillLearning
 from iowbc.recipe.skill.task import Tasks
 
 Rival = Literal["nominal", "follow", "lead", "clock", "stand"]
