@@ -101,8 +101,7 @@ def comparison(summary: pd.DataFrame, capacity_rate: float) -> Figure:
 
 def robustness(summary: pd.DataFrame, rate: float) -> Figure:
     """Success in the robustness and stagnation suites, and the impulse on the base survived by direction."""
-    pushes = summary[summary["kind"] == "pushes"]
-    parts = []
+    parts, survived = [], push_capacities(summary, rate)
     for suite in suites_of(summary, "robustness", "stagnation", "pushes"):
         chosen = summary[summary["suite"] == suite]
         row = pd.factorize(chosen["case"])[0] // CASES_PER_ROW
@@ -112,8 +111,8 @@ def robustness(summary: pd.DataFrame, rate: float) -> Figure:
     panels = list(figure.subplots(len(parts), 1, squeeze=False).flat)
     for axes, chosen in zip(panels, parts, strict=True):
         if (chosen["kind"] == "pushes").all():
-            _capacity_bars(axes, push_capacities(summary, rate), list(dict.fromkeys(chosen["case"])))
-            axes.set(title=f"impulse survived, {masses_of(pushes)}", ylabel="impulse [N·s]")
+            _capacity_bars(axes, survived, list(dict.fromkeys(chosen["case"])))
+            axes.set(title=f"impulse survived, {masses_of(chosen)}", ylabel="impulse [N·s]")
         else:
             _success_panel(axes, chosen, f"success, {chosen['suite'].iloc[0]}")
         axes.set_xlim(-0.6, CASES_PER_ROW - 0.4)
