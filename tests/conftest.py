@@ -43,6 +43,7 @@ class Scheduling(LoadFileScheduling):  # type: ignore[misc]
         return "ray" if file in RAY else file
 
 
+@pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Scheduling:
     """Which process has which tests."""
     return Scheduling(config, log)

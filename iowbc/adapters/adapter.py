@@ -100,6 +100,8 @@ def validate_adapter(adapter: Adapter, robot: Robot, frequency: float, *, moves_
         values, expected = getattr(adapter, name), (len(adapter.acted if name == "scale" else adapter.joints),)
         if np.shape(values) != expected or not np.isfinite(values).all():
             problems.append(f"{name}: has shape {np.shape(values)}, expected {expected} finite numbers")
+        elif name in ("kp", "kd") and np.min(values) < 0.0:
+            problems.append(f"{name}: has the negative gain {np.min(values):g}, which would drive its joint away")
     if adapter.frequency != frequency:
         text = f"frequency: is {adapter.frequency:g} Hz, the trials run at {frequency:g} Hz"
         problems.append(f"{text}; set task.control_frequency to it")

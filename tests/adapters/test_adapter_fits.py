@@ -39,6 +39,7 @@ def test_a_fitting_adapter_passes(robot: Robot, adapter: Adapter) -> None:
         ({"joints": ("left_elbow",)}, "joints: unknown or repeated .'left_elbow'.; valid: left_hip_pitch_joint"),
         ({"acted": ("left_knee_joint",), "scale": np.ones(1)}, "acted: lacks left_hip_pitch_joint"),
         ({"kp": np.ones(3)}, r"kp: has shape \(3,\), expected \(29,\) finite numbers"),
+        ({"kd": np.full(29, -1.0)}, r"kd: has the negative gain -1, which would drive its joint away"),
         ({"default": np.full(29, np.nan)}, "default: has shape"),
         ({"frequency": 100.0}, "is 100 Hz, the trials run at 50 Hz; set task.control_frequency"),
         ({"history": 0}, "history: is 0"),

@@ -156,7 +156,7 @@ class Plant:
 def _ring(outward: Array, radius: float) -> list[Array]:
     """Corners of a triangle around an axis (3,), from its centre [m]."""
     axis = outward / np.linalg.norm(outward)
-    first = np.cross(axis, (0.0, 0.0, 1.0))
+    first = np.cross(axis, (0.0, 0.0, 1.0) if abs(axis[2]) < 0.9 else (1.0, 0.0, 0.0))
     first /= np.linalg.norm(first)
     second = np.cross(axis, first)
     return [radius * (np.cos(angle) * first + np.sin(angle) * second) for angle in 2.0 / 3.0 * np.pi * np.arange(3)]
