@@ -158,8 +158,8 @@ class Planner:
         """The plan of a stage that runs, with the earlier attempt or the artifact of a shorter run to resume."""
         stage, notes, expected, predecessor = step.stage, list(step.notes), step.expected, None
         record = read_record(Progress, self.store.runs.work / step.key / PROGRESS)
-        forced = stage.name in self.options.force
-        if record and (record.forced or not forced):
+        forced, rerun = stage.name in self.options.force, self.options.on_code_change == "rerun"
+        if record and record.continues(forced, step.code if rerun else None):
             notes.append(", ".join(filter(None, [f"goes on from attempt {record.attempts or 1}", record.share])))
             if record.done and record.total and record.seconds:  # the remaining part at the attempt's rate
                 expected = record.seconds * max(0.0, record.total / record.done - 1.0)

@@ -210,6 +210,17 @@ def test_a_stage_that_stops_right_after_it_was_resumed_is_as_far_as_before(tmp_p
     assert again.state.done == 0, "a forced attempt begins anew"
 
 
+def test_an_attempt_of_other_code_is_begun_anew_when_asked(tmp_path: Path) -> None:
+    workspace = Workspace(Runs(tmp_path), "teacher", "key")
+    workspace.begin("small", False, {"task": "old"})
+    (workspace.scratch / "checkpoint").touch()
+    assert workspace.begin("small", False, {"task": "new"}), "by default it is continued"
+    assert workspace.begin("small", False, {"task": "old"}, same_code=True)
+    assert not workspace.begin("small", False, {"task": "new"}, same_code=True)
+    assert not list(workspace.scratch.iterdir())
+    assert workspace.begin("small", False, {"task": "new"}, same_code=True)
+
+
 def rewritten(folder: Path, **entries: Any) -> None:
     """The manifest of an artifact with other entries."""
     manifest = Manifest.model_validate_json((folder / MANIFEST).read_bytes())

@@ -2,6 +2,7 @@
 
 import shutil
 import time
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
 
@@ -37,6 +38,7 @@ class Progress(BaseModel, ser_json_inf_nan="constants"):
     curve: list[tuple[Number, float]] = Field(default_factory=list)
     """Steps and values of the small curve, named `metric`, over all attempts; a resumed run continues it."""
     code: dict[str, str] = Field(default_factory=dict)
+    """Code of the first attempt."""
     command: str = ""
     """Command that resumes it."""
 
@@ -44,6 +46,11 @@ class Progress(BaseModel, ser_json_inf_nan="constants"):
     def share(self) -> str:
         """The part that is done, in percent; empty where the total is not known."""
         return f"{100 * self.done / self.total:.0f} %" if self.total else ""
+
+    def continues(self, forced: bool, code: Mapping[str, str] | None) -> bool:
+        """True if a new attempt continues this one: a forced attempt only a forced one, and one with `code` only what
+        was begun with the same code."""
+        return (self.forced or not forced) and (code is None or code == self.code)
 
 
 class Workspace:
@@ -59,18 +66,20 @@ class Workspace:
         """Record of the current attempt."""
         self._begun = self._written = 0.0
 
-    def begin(self, recipe: str, forced: bool, code: dict[str, str], command: str = "") -> Progress | None:
-        """Make room for an attempt; returns the record of the earlier one that it continues, for a forced attempt only
-        a forced one. `command`: resumes it when it is stopped."""
+    def begin(
+        self, recipe: str, forced: bool, code: dict[str, str], command: str = "", *, same_code: bool = False
+    ) -> Progress | None:
+        """Make room for an attempt; returns the record of the earlier one that it continues. `command`: resumes it when
+        it is stopped; `same_code`: continue only what was begun with this code."""
         earlier = read_record(Progress, self.root / PROGRESS)
-        if forced and not (earlier and earlier.forced):
+        if not (earlier or Progress()).continues(forced, code if same_code else None):
             shutil.rmtree(self.root, ignore_errors=True)
             earlier = None
         shutil.rmtree(self.out, ignore_errors=True)
         self.scratch.mkdir(parents=True, exist_ok=True)
         self.out.mkdir()
         self._begun, former = time.monotonic(), earlier or Progress()
-        own = {"stage": self.stage, "recipe": recipe, "code": code, "command": command}
+        own = {"stage": self.stage, "recipe": recipe, "code": former.code or code, "command": command}
         counted = {"attempts": former.attempts + 1, "before": former.seconds, "forced": forced or former.forced}
         self.state = former.model_copy(update=own | counted)
         self.write()
