@@ -178,7 +178,8 @@ def start_comparison(words: Sequence[str], folder: Path) -> None:
 
 
 def points_of(store: Store, words: Sequence[str]) -> list[str]:
-    """Names of recipes, each once; the name of a sweep, study or comparison is replaced by its finished recipes."""
+    """Names of recipes, each once; the name of a sweep, study or comparison is replaced by its finished recipes.
+    Raises `UsageError` if none of them has finished."""
     recipes = finished_recipes(store)
     found: list[str] = []
     for word in words:
@@ -186,7 +187,10 @@ def points_of(store: Store, words: Sequence[str]) -> list[str]:
         if word not in recipes:
             swept = _recorded(store.runs.sweeps / word / SWEEP_RECORD, "points")
             names = swept or members_of(word) or _recorded(store.runs.compared / word / COMPARISON_RECORD, "runs")
-        found += [name for name in names if name in recipes] or [word]
+        finished = [name for name in names if name in recipes]
+        if names and not finished:
+            raise UsageError(f"{word}: none of {', '.join(names)} has finished a stage; `iowbc run` makes them")
+        found += finished or [word]
     return list(dict.fromkeys(found))
 
 

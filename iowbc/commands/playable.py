@@ -99,8 +99,10 @@ def named_source(
     from iowbc.evaluation.play import exported_source, with_evaluation
 
     if os.path.isfile(Path(word, CONTRACT)):
+        if stage is not None:
+            raise UsageError(f"{word} is an export folder and names one policy; leave --stage out")
         return exported_source(Path(word))
-    training, checkpoint = in_training(store, word, stage)
+    training, checkpoint = in_training(store, word, stage, plan)
     if checkpoint is not None:
         tell(console, training)
         return checkpoint
@@ -112,7 +114,7 @@ def named_source(
         text = "there is neither a checkpoint that can be played nor a finished one; `iowbc status` tells how far it is"
         raise UsageError(f"{training}; {text}") from None
     if training:
-        tell(console, f"{training}; this is a finished one")
+        tell(console, f"{training}; this is another, which has finished")
     known = plan.recipe or recall(store.runs, word.partition("/")[0]).recipe
     asked = Evaluation.model_validate(known["eval"]) if "eval" in known else None
     require_whole(store.runs, [artifact])
@@ -125,23 +127,30 @@ def named_source(
     return source if asked is None else with_evaluation(source, asked)
 
 
-def in_training(store: Store, word: str, stage: str | None) -> "tuple[str, Source | None]":
+def in_training(
+    store: Store, word: str, stage: str | None, plan: Run = UNPLANNED
+) -> "tuple[str, Source | None]":
     """Message about the newest unfinished training that `RECIPE/STAGE`, or a recipe and `--stage`, names, empty without
-    one; and its checkpoint, if that can be played. Raises `UsageError` if its reference generator is gone."""
+    one, and where the plan uses a finished one; and its checkpoint, if that can be played: that of an interrupted
+    training only where none has finished. Raises `UsageError` if its reference generator is gone."""
     from iowbc.evaluation.play import Source
 
     name, slash, last = word.rpartition("/")
     name, wanted = (name, last) if slash and Path(word).suffix not in SUFFIXES else (word, stage)
-    if wanted not in STAGES or not STAGES[wanted].trained_by:
+    if slash and last in STAGES and stage not in (None, last):
+        raise UsageError(f"{word} --stage {stage}: two stages; name one of them")
+    if wanted not in STAGES or not STAGES[wanted].trained_by or wanted in plan.artifacts:
         return "", None
     own = [one for one in unfinished(store.runs) if (one[1].stage, one[1].recipe) == (wanted, name_in(name))]
     if not own:
         return "", None
     folder, record = own[0]
     checkpoint, ingredients, recipe = folder / CHECKPOINT, read_json(folder / INGREDIENTS), read_yaml(folder / RECIPE)
-    state = "is being trained" if holder(store.runs, folder.name) else "was interrupted"
+    held = holder(store.runs, folder.name)
+    state = "is being trained" if held else "was interrupted"
     text = f"{wanted} of {record.recipe} {state}{f', {record.share} done' if record.share else ''}"
-    if wanted != "teacher" or not (checkpoint.is_file() and recipe and ingredients):
+    finished = not held and not plan.recipe and wanted in _finished(store, name).usable
+    if finished or wanted != "teacher" or not (checkpoint.is_file() and recipe and ingredients):
         return text, None
     generator = input_artifact(store, ingredients, "rg-fit", f"{wanted} {folder.name[:12]}")
     text += f"; this is its checkpoint of {ago(checkpoint.stat().st_mtime)}"

@@ -297,6 +297,14 @@ def test_a_record_of_a_sweep_of_other_types_is_none(tmp_path: Path, text: str) -
     assert points_of(Store(runs), ["wide"]) == ["wide"]
 
 
+def test_a_sweep_of_which_nothing_has_finished_is_told(tmp_path: Path) -> None:
+    runs = Runs(tmp_path)
+    (runs.sweeps / "wide").mkdir(parents=True)
+    (runs.sweeps / "wide" / "sweep.json").write_text('{"points": {"wide_a": {}, "wide_b": {}}}')
+    with pytest.raises(UsageError, match="wide: none of wide_a, wide_b has finished a stage"):
+        points_of(Store(runs), ["wide"])
+
+
 def test_what_is_damaged_is_neither_played_nor_compared_nor_reported(folder: Path, key: Key) -> None:
     (folder / "runs" / "store" / "eval" / key("second", "eval") / "tables" / "counts.md").write_bytes(bytes(range(256)))
     store, console = Store(Runs(folder / "runs")), Console()

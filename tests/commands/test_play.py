@@ -15,6 +15,7 @@ from own_parts import own_part
 from rich.console import Console
 
 from iowbc.commands import printed
+from iowbc.commands.lookup import named
 from iowbc.commands.playable import UNPLANNED, in_training, named_source, planned, whole_source
 from iowbc.commands.printed import film_progress
 from iowbc.errors import UsageError
@@ -25,29 +26,43 @@ from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.store.workspace import Workspace
 from iowbc.recipe.recipe import Recipe
+from iowbc.report.runs import Run
 
 ROOT = Path(__file__).parents[2]
 
 
 def test_an_unfinished_training_is_told_and_played_from_its_checkpoint(folder: Path) -> None:
     store = Store(Runs(folder / "runs"))
-    assert in_training(store, "first/teacher", None) == ("", None)
+    assert in_training(store, "new/teacher", None) == ("", None)
     workspace = Workspace(store.runs, "teacher", "f" * 64)
-    workspace.begin("first", False, {})
+    workspace.begin("new", False, {})
     workspace.progress(42, 100, "")
     workspace.write()
-    assert in_training(store, "first/teacher", None) == ("teacher of first was interrupted, 42 % done", None)
+    assert in_training(store, "new/teacher", None) == ("teacher of new was interrupted, 42 % done", None)
     checkpoint = workspace.scratch / "training.checkpoint"
     checkpoint.write_bytes(b"")
     os.utime(checkpoint, 2 * (time.time() - 3600,))
-    describe(workspace.root, {"inputs": {}}, "name: first\n")
-    told, playable = in_training(store, "first", "teacher")
+    describe(workspace.root, {"inputs": {}}, "name: new\n")
+    told, playable = in_training(store, "new", "teacher")
     assert playable is not None
-    assert (playable.world.recipe, playable.policy, playable.key) == (Recipe(name="first"), checkpoint, "f" * 64)
-    assert told.startswith("teacher of first was interrupted, 42 % done; this is its checkpoint of 60 min ago")
-    assert in_training(store, "first", None) == ("", None)
+    assert (playable.world.recipe, playable.policy, playable.key) == (Recipe(name="new"), checkpoint, "f" * 64)
+    assert told.startswith("teacher of new was interrupted, 42 % done; this is its checkpoint of 60 min ago")
+    assert in_training(store, "new", None) == ("", None)
     assert in_training(store, "second/teacher", None) == ("", None)
-    assert in_training(store, "first/distill", None) == ("", None)
+    assert in_training(store, "new/distill", None) == ("", None)
+    with pytest.raises(UsageError, match="two stages; name one of them"):
+        in_training(store, "new/teacher", "distill")
+
+
+def test_the_checkpoint_of_an_interrupted_training_is_not_preferred_to_a_finished_one(folder: Path) -> None:
+    store = Store(Runs(folder / "runs"))
+    workspace = Workspace(store.runs, "teacher", "f" * 64)
+    workspace.begin("first", False, {})
+    (workspace.scratch / "training.checkpoint").write_bytes(b"")
+    describe(workspace.root, {"inputs": {}}, "name: first\n")
+    assert in_training(store, "first/teacher", None) == ("teacher of first was interrupted", None)
+    artifacts = named(store, "first").artifacts
+    assert in_training(store, "first", "teacher", Run("first", artifacts, {"name": "first"})) == ("", None)
 
 
 def test_a_training_without_a_checkpoint_yet_is_told_in_one_sentence(folder: Path) -> None:
