@@ -1,7 +1,8 @@
 """Description of a third-party controller: joints, gains, observation, action and network."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from numbers import Real
 
 import numpy as np
 
@@ -95,44 +96,69 @@ class Adapter:
 def validate_adapter(adapter: Adapter, robot: Robot, frequency: float, *, moves_arms: bool = False) -> None:
     """Check an adapter against a robot and a control rate [Hz], and its network against its observation. `moves_arms`:
     the controller acts on all arm joints, too. Raises StageFailed with the field, its value and the valid values."""
-    problems = _joint_name_problems(adapter, robot, moves_arms)
-    for name in ("default", "kp", "kd", "scale"):
-        values, expected = getattr(adapter, name), (len(adapter.acted if name == "scale" else adapter.joints),)
-        if np.shape(values) != expected or not np.isfinite(values).all():
-            problems.append(f"{name}: has shape {np.shape(values)}, expected {expected} finite numbers")
-        elif name in ("kp", "kd") and np.min(values) < 0.0:
-            problems.append(f"{name}: has the negative gain {np.min(values):g}, which would drive its joint away")
-    if adapter.frequency != frequency:
-        text = f"frequency: is {adapter.frequency:g} Hz, the trials run at {frequency:g} Hz"
-        problems.append(f"{text}; set task.control_frequency to it")
-    if adapter.history < 1:
-        problems.append(f"history: is {adapter.history}, expected at least the present observation")
-    if unknown := sorted(set(adapter.ranges or ()) - set(VELOCITIES)):
-        problems.append(f"ranges: {', '.join(unknown)}: no such velocity; valid: {', '.join(VELOCITIES)}")
+    problems = [*_joint_name_problems(adapter, robot, moves_arms), *_value_problems(adapter, robot, frequency)]
     if problems:
         raise StageFailed(f"{PLACE}: does not fit the robot {robot.name}: {'; '.join(problems)}")
     try:  # a step of a robot that stands in the default posture
-        parts = [np.asarray(term(standing(adapter)), np.float64)[:, None] for term in adapter.terms]
-        past = tuple(np.repeat(values, adapter.history, 1) for values in parts)
+        parts = [np.asarray(term(standing(adapter)), np.float64) for term in adapter.terms]
+    except Exception as error:
+        raise StageFailed(f"{PLACE}: cannot make a step: {type(error).__name__}: {error}") from error
+    for number, values in enumerate(parts):
+        if values.ndim != 2 or len(values) != 1 or not np.isfinite(values).all():
+            text = f"terms: number {number} (from 0) gives {_described(values)} for one robot, expected (1, size)"
+            raise StageFailed(f"{PLACE}: {text} of finite numbers")
+    try:
+        past = tuple(np.repeat(values[:, None], adapter.history, 1) for values in parts)
         observation = adapter.observed(past).astype(np.float32)
         answer = np.asarray(adapter.network(observation))
     except Exception as error:
         raise StageFailed(f"{PLACE}: cannot make a step: {type(error).__name__}: {error}") from error
     if answer.shape != (1, len(adapter.acted)) or not np.isfinite(answer).all():
-        text = f"its network gives shape {answer.shape} for an observation of {observation.shape[1]} numbers"
+        text = f"its network gives {_described(answer)} for an observation of {observation.shape[1]} numbers"
         raise StageFailed(f"{PLACE}: {text}; expected {(1, len(adapter.acted))} finite numbers, one a joint of `acted`")
 
 
 def _joint_name_problems(adapter: Adapter, robot: Robot, moves_arms: bool) -> list[str]:
     found = []
     for field, names, known in (("joints", adapter.joints, robot.joints), ("acted", adapter.acted, adapter.joints)):
-        unknown = [name for name in names if name not in known]
-        if unknown or len(set(names)) != len(names):
-            found.append(f"{field}: unknown or repeated {unknown or 'names'}; valid: {', '.join(known)}")
+        if wrong := sorted({name for name in names if name not in known or names.count(name) > 1}):
+            found.append(f"{field}: unknown or repeated {wrong}; valid, once each: {', '.join(known)}")
     needed = [robot.joints[index] for index in (*robot.support, *(robot.interaction if moves_arms else ()))]
     missing = ", ".join(name for name in needed if name not in adapter.acted)
     remedy = "; a controller without arms of its own needs arms: measured or default" if moves_arms else ""
     return [*found, f"acted: lacks {missing}{remedy}"] if missing else found
+
+
+def _value_problems(adapter: Adapter, robot: Robot, frequency: float) -> Iterator[str]:
+    for name in ("default", "kp", "kd", "scale"):
+        values, size = np.asarray(getattr(adapter, name)), len(adapter.acted if name == "scale" else adapter.joints)
+        if values.shape != (size,) or values.dtype.kind not in "fiu" or not np.isfinite(values).all():
+            yield f"{name}: has {_described(values)}, expected {(size,)} finite numbers"
+        elif name in ("kp", "kd") and values.min() < 0.0:
+            yield f"{name}: has the negative gain {values.min():g}, which would drive its joint away"
+        elif name == "default":
+            for index in robot.support:
+                joint, low, high = robot.joints[index], robot.lower[index], robot.upper[index]
+                angle = values[adapter.joints.index(joint)] if joint in adapter.joints else low
+                if not low <= angle <= high:
+                    yield f"default: {joint} is {angle:g} rad, its range {low:.3g} to {high:.3g} rad"
+    if not isinstance(adapter.frequency, Real):
+        yield f"frequency: is {adapter.frequency!r}, expected a number [Hz]"
+    elif adapter.frequency != frequency:
+        text = f"frequency: is {adapter.frequency:g} Hz, the trials run at {frequency:g} Hz"
+        yield f"{text}; set task.control_frequency to it"
+    if adapter.history < 1:
+        yield f"history: is {adapter.history}, expected at least the present observation"
+    for name, bounds in (adapter.ranges or {}).items():
+        if name not in VELOCITIES:
+            yield f"ranges: {name}: no such velocity; valid: {', '.join(VELOCITIES)}"
+        elif np.shape(bounds) != (2,) or not all(isinstance(end, Real) for end in bounds) or not bounds[0] <= bounds[1]:
+            yield f"ranges: {name}: is {bounds}, expected its smallest and its largest value"
+
+
+def _described(values: Array) -> str:
+    finite = values.dtype.kind in "fiu" and np.isfinite(values).all()
+    return f"shape {values.shape}{'' if finite else ', not all of it finite numbers'}"
 
 
 def standing(adapter: Adapter) -> Seen:

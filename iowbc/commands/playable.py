@@ -127,9 +127,7 @@ def named_source(
     return source if asked is None else with_evaluation(source, asked)
 
 
-def in_training(
-    store: Store, word: str, stage: str | None, plan: Run = UNPLANNED
-) -> "tuple[str, Source | None]":
+def in_training(store: Store, word: str, stage: str | None, plan: Run = UNPLANNED) -> "tuple[str, Source | None]":
     """Message about the newest unfinished training that `RECIPE/STAGE`, or a recipe and `--stage`, names, empty without
     one, and where the plan uses a finished one; and its checkpoint, if that can be played: that of an interrupted
     training only where none has finished. Raises `UsageError` if its reference generator is gone."""

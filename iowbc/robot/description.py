@@ -135,7 +135,9 @@ def _described(folder: Path, entries: Any) -> Robot:
         if entries[key] not in tree.bodies:
             raise ValueError(f"{key}: no body {entries[key]!r} in {mjcf.name}; it has {', '.join(tree.bodies)}")
     support = _indices("support", entries["support"], joints)
-    pairs = entries.get("linkages", [])
+    pairs = entries.get("linkages") or []
+    if not isinstance(entries["joints"], Mapping):
+        raise ValueError(f"joints: expected a mapping from kinds of joints, found {type(entries['joints']).__name__}")
     if any(len(pair) != 2 for pair in pairs):
         raise ValueError(f"linkages: expected pairs of joints, found {pairs}")
     rows = [_row(entries["joints"], name) for name in joints]

@@ -11,6 +11,8 @@ from iowbc.arrays import Array
 from iowbc.files import read_limited
 from iowbc.robot import rotations
 
+LARGEST_ANGLE = 2.0 * np.pi
+"""Largest limit of a joint [rad]; larger ones are probably degrees."""
 LARGEST_FILE = 1_000_000
 """Largest size of a robot's files [bytes]."""
 
@@ -143,7 +145,10 @@ class Tree:
 
 def small_text(path: Path) -> str:
     """Text of one of a robot's files. Raises OSError, or ValueError for a file of another kind or too large."""
-    return read_limited(path, LARGEST_FILE).decode("utf-8")
+    try:
+        return read_limited(path, LARGEST_FILE).decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise ValueError(f"{path}: is no UTF-8 text: {error}") from error
 
 
 UNREAD = {
@@ -180,63 +185,80 @@ def read_tree(path: Path) -> Tree:
         raise ValueError(f"{path}: no <worldbody>")
     if world.find("body/freejoint") is None or root.find("actuator") is not None:
         raise ValueError(f"{path}: expected a <freejoint> in the base, and no <actuator>: the program adds motors")
-    bodies = {body.name: body for child in world.findall("body") for body in _bodies(child, None, path)}
+    if world.find("geom") is not None:
+        raise ValueError(f"{path}: a <geom> of the world: remove it, the program adds the ground")
+    try:
+        bodies = {body.name: body for child in world.findall("body") for body in _bodies(child, None)}
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from error
     excluded = frozenset(
         frozenset((pair.attrib["body1"], pair.attrib["body2"])) for pair in root.findall("contact/exclude")
     )
     return Tree(bodies, excluded)
 
 
-def _bodies(element: ElementTree.Element, parent: str | None, path: Path) -> Iterator[Body]:
+def _bodies(element: ElementTree.Element, parent: str | None) -> Iterator[Body]:
     name = element.attrib.get("name")
     if name is None:
-        raise ValueError(f"{path}: a body inside {parent or 'the world'!r} has no name")
+        raise ValueError(f"a body inside {parent or 'the world'!r} has no name")
     joints, inertial, geoms = element.findall("joint"), element.find("inertial"), element.findall("geom")
     if len(joints) > 1 or any(joint.get("type", "hinge") != "hinge" for joint in joints):
-        raise ValueError(f"{path}: body {name!r}: expected one hinge at most")
-    feet = [_numbers(geom, "pos", "0 0 0")[:2] for geom in geoms if geom.get("class") == "foot"]
+        raise ValueError(f"body {name!r}: expected one hinge at most")
+    mass = 0.0 if inertial is None else float(_numbers(inertial, "mass", 1)[0])
+    if mass < 0.0:
+        raise ValueError(f"body {name!r}: has the mass {mass:g} kg")
+    feet = [_numbers(geom, "pos", 3, "0 0 0")[:2] for geom in geoms if geom.get("class") == "foot"]
     yield Body(
         name=name,
         parent=parent,
-        position=_numbers(element, "pos", "0 0 0"),
-        quaternion=rotations.normalized(_numbers(element, "quat", "1 0 0 0")),
-        hinge=_hinge(joints[0], path) if joints else None,
-        sites={site.attrib["name"]: _numbers(site, "pos", "0 0 0") for site in element.findall("site")},
+        position=_numbers(element, "pos", 3, "0 0 0"),
+        quaternion=rotations.normalized(_numbers(element, "quat", 4, "1 0 0 0")),
+        hinge=_hinge(joints[0]) if joints else None,
+        sites={site.attrib["name"]: _numbers(site, "pos", 3, "0 0 0") for site in element.findall("site")},
         capsules=tuple(_capsule(geom) for geom in geoms if geom.get("class") == "body"),
         feet=np.array(feet).reshape(-1, 2),
-        mass=0.0 if inertial is None else float(inertial.attrib["mass"]),
-        centre=np.zeros(3) if inertial is None else _numbers(inertial, "pos", "0 0 0"),
+        mass=mass,
+        centre=np.zeros(3) if inertial is None else _numbers(inertial, "pos", 3, "0 0 0"),
     )
     for child in element.findall("body"):
-        yield from _bodies(child, name, path)
+        yield from _bodies(child, name)
 
 
-def _hinge(element: ElementTree.Element, path: Path) -> Hinge:
+def _hinge(element: ElementTree.Element) -> Hinge:
+    name = element.attrib.get("name", "?")
     for needed in ("name", "axis", "range", "actuatorfrcrange", "armature"):
         if needed not in element.attrib:
-            raise ValueError(f"{path}: joint {element.attrib.get('name', '?')!r} lacks the attribute {needed!r}")
-    axis, limits = _numbers(element, "axis", ""), _numbers(element, "range", "")
-    if not np.linalg.norm(axis) > 0.0:
-        raise ValueError(f"{path}: joint {element.attrib['name']!r} has the axis {element.attrib['axis']!r}")
-    return Hinge(
-        name=element.attrib["name"],
-        axis=axis / np.linalg.norm(axis),
-        lower=float(limits[0]),
-        upper=float(limits[1]),
-        effort=float(_numbers(element, "actuatorfrcrange", "")[1]),
-        armature=float(element.attrib["armature"]),
-    )
+            raise ValueError(f"joint {name!r} lacks the attribute {needed!r}")
+    axis, (lower, upper) = _numbers(element, "axis", 3), _numbers(element, "range", 2).tolist()
+    effort, armature = float(_numbers(element, "actuatorfrcrange", 2)[1]), float(_numbers(element, "armature", 1)[0])
+    for wrong, attribute, expected in (
+        (not np.linalg.norm(axis) > 0.0, "axis", "a direction"),
+        (not -LARGEST_ANGLE <= lower < upper <= LARGEST_ANGLE, "range", "two angles in radians, the smaller one first"),
+        (effort <= 0.0, "actuatorfrcrange", "a largest torque above 0"),
+        (armature < 0.0, "armature", "an inertia of 0 or more"),
+    ):
+        if wrong:
+            raise ValueError(f"joint {name!r} has the {attribute} {element.attrib[attribute]!r}, expected {expected}")
+    return Hinge(name, axis / np.linalg.norm(axis), lower, upper, effort, armature)
 
 
 def _capsule(element: ElementTree.Element) -> Capsule:
     radius = float(element.attrib["size"].split()[0])
     name = element.attrib.get("name", "")
     if "fromto" in element.attrib:
-        ends = _numbers(element, "fromto", "")
+        ends = _numbers(element, "fromto", 6)
         return Capsule(name, ends[:3], ends[3:], radius)
-    centre = _numbers(element, "pos", "0 0 0")
+    centre = _numbers(element, "pos", 3, "0 0 0")
     return Capsule(name, centre, centre, radius)
 
 
-def _numbers(element: ElementTree.Element, attribute: str, default: str) -> Array:
-    return np.array([float(word) for word in element.attrib.get(attribute, default).split()])
+def _numbers(element: ElementTree.Element, attribute: str, count: int, default: str = "") -> Array:
+    text = element.attrib.get(attribute, default)
+    try:
+        values = np.array([float(word) for word in text.split()])
+    except ValueError:
+        values = np.zeros(0)
+    if len(values) != count or not np.isfinite(values).all():
+        where = f"<{element.tag} {attribute}={text!r}> of {element.get('name', 'an element without a name')!r}"
+        raise ValueError(f"{where}: expected {count} finite {'number' if count == 1 else 'numbers'}")
+    return values

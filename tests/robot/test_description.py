@@ -146,6 +146,18 @@ def test_an_unknown_column_of_a_joint_is_refused(folder: Path) -> None:
             '<joint name="left_knee_joint" axis="0 0 0"',
             r"has the axis '0",
         ),
+        ("g1.xml", "</worldbody>", '<geom type="plane" size="1 1 1"/></worldbody>', r"g1\.xml: a <geom> of the world"),
+        ("g1.xml", 'armature="', 'armature="x', r"g1\.xml: <joint armature='x0.*expected 1 finite number"),
+        ("g1.xml", 'armature="', 'armature="-', r"has the armature '-0.*an inertia of 0 or more"),
+        ("g1.xml", 'mass="', 'mass="-', r"body 'pelvis': has the mass -"),
+        (
+            "g1.xml",
+            ' range="',
+            ' range="-180 180" name2="',
+            r"has the range '-180 180', expected two angles in radians",
+        ),
+        ("g1.xml", ' actuatorfrcrange="', ' actuatorfrcrange="0 0" name2="', r"expected a largest torque above 0"),
+        ("robot.yaml", "linkages:", "linkages:\nold:", r"unknown entry old"),
     ],
 )
 def test_what_no_stage_could_use_is_refused(folder: Path, file: str, old: str, new: str, message: str) -> None:
