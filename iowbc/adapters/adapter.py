@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from numbers import Real
+from typing import Any
 
 import numpy as np
 
@@ -142,10 +143,11 @@ def _value_problems(adapter: Adapter, robot: Robot, frequency: float) -> Iterato
                 angle = values[adapter.joints.index(joint)] if joint in adapter.joints else low
                 if not low <= angle <= high:
                     yield f"default: {joint} is {angle:g} rad, its range {low:.3g} to {high:.3g} rad"
-    if not isinstance(adapter.frequency, Real):
-        yield f"frequency: is {adapter.frequency!r}, expected a number [Hz]"
-    elif adapter.frequency != frequency:
-        text = f"frequency: is {adapter.frequency:g} Hz, the trials run at {frequency:g} Hz"
+    own: Any = adapter.frequency
+    if not isinstance(own, Real):
+        yield f"frequency: is {own!r}, expected a number [Hz]"
+    elif own != frequency:
+        text = f"frequency: is {own:g} Hz, the trials run at {frequency:g} Hz"
         yield f"{text}; set task.control_frequency to it"
     if adapter.history < 1:
         yield f"history: is {adapter.history}, expected at least the present observation"

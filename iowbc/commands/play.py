@@ -62,6 +62,8 @@ def play(
         disturbances=disturbances,
         video=video,
     )
+    if request.object_mass == 0.0 and (mass or partner_share):
+        raise UsageError("--mass above 0 and --partner-share need an object: choose another --scene, or no --mass 0")
     if web and video is not None:
         raise UsageError("--web and --video exclude each other: open the page, or make a film")
     options.require_extra("train", "iowbc play")

@@ -15,6 +15,7 @@ from iowbc.commands.printed import plain_table, stdout_console, tell
 from iowbc.deploy.controller import Controller
 from iowbc.deploy.exported_folder import exported_folder
 from iowbc.errors import UsageError, require_known
+from iowbc.evaluation.play_request import HEAVIEST
 from iowbc.onboard.checks import CHECKS, LIMITS, CheckResult, checks
 from iowbc.onboard.machine import Machine
 from iowbc.onboard.operators import Keyboard, OperatorWithPoses, Udp, operator, single_keys, udp_port
@@ -66,6 +67,8 @@ def robot(
         require_known(name, "check", CHECKS)
     if lockstep and network != "lo":
         raise UsageError("--lockstep is for a simulated robot on this machine (--network lo); a robot does not wait")
+    if log is not None and (dry_run or log.exists()):
+        raise UsageError(f"--log {log}: " + ("--dry-run logs nothing" if dry_run else "exists; name a new file"))
     controller = Controller.load(exported_folder(what))
     require_known(scene, "scene", [name for name, _ in controller.contract.references.grasps])
     source = operator(commands, controller.contract)
@@ -175,6 +178,9 @@ def robot_sim(
     require_known(scene, "scene", simulation.scenes.names)
     controller.reset(scene=scene)
     loaded = getattr(simulation.scenes, scene).object is not None
+    if mass is not None and not (loaded and 0.0 < mass <= HEAVIEST):
+        held = f"should be above 0 and at most {HEAVIEST:g} kg" if loaded else f"scene {scene} has no object"
+        raise UsageError(f"--mass {mass:g}: {held}")
     kind = support or ("fixture" if loaded else "band")
     fixed = {"impulse_scale": 0.0, "push_scale": 0.0}
     if loaded:

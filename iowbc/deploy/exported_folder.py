@@ -27,7 +27,7 @@ GENERATOR = "rg"
 def exported_folder(word: Path | str) -> Path:
     """The folder `word`, or the export of the recipe with that name in `IOWBC_RUNS`, else `./runs`, or the one
     published with the repository. `RECIPE/export` and a prefix of a key are accepted, too, as in all commands. Raises
-    ContractBroken for an ambiguous prefix."""
+    ContractBroken for an ambiguous prefix, and where nothing has that name."""
     folder, runs = Path(word), Path(os.environ.get("IOWBC_RUNS") or "runs")
     name = str(word).removesuffix(f"/{EXPORT}")
     published = sorted(runs.glob(f"published/{EXPORT}/*"))
@@ -37,6 +37,11 @@ def exported_folder(word: Path | str) -> Path:
     found = next((place for place in (folder, runs / name / EXPORT, *shipped) if (place / CONTRACT).is_file()), None)
     if found is None and len(keyed) > 1:
         raise ContractBroken(f"{name}: the keys of {len(keyed)} exports begin like that; give more characters")
+    if found is None and not keyed and not folder.exists():
+        made = [place.parent.name for place in runs.glob(f"*/{EXPORT}") if (place / CONTRACT).is_file()]
+        names = sorted({*made, *filter(None, map(_recipe_name, published))})
+        text = f"neither an export folder nor a recipe with an export; those with one: {', '.join(names) or 'none'}"
+        raise ContractBroken(f"{word}: {text}")
     return found or next(iter(keyed), folder)
 
 

@@ -59,7 +59,8 @@ Share = Annotated[float, Field(ge=0, le=1)]
 Vector = tuple[float, float, float]
 HiddenLayers = Annotated[tuple[Annotated[int, Field(gt=0, le=16_384)], ...], Field(max_length=16)]
 """Units of the hidden layers of a network."""
-ArtifactName = Annotated[str, Field(pattern=r"^([0-9a-f]{8,64}|.+\.ya?ml)$", max_length=300)]
+ARTIFACT_NAME = r"^([0-9a-f]{8,64}|.+\.ya?ml)$"
+ArtifactName = Annotated[str, Field(pattern=ARTIFACT_NAME, max_length=300)]
 """Artifact of another recipe: that recipe's file, or the first characters (8 or more) of the artifact's key."""
 OWN_NAME = "[a-z][a-z0-9_]{0,31}"
 """Pattern of the name of a custom scene or reward term."""

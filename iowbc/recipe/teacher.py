@@ -119,7 +119,7 @@ class Teacher(PPO):
     the cost of fewer different states (docs/log/groups.md). 1: separate environments, as in the paper."""
     rollout: int = Field(default=48, ge=2, le=10_000)
     """Control steps that each environment contributes to one update."""
-    hidden: HiddenLayers = (512, 256, 128)
+    hidden: HiddenLayers = Field(default=(512, 256, 128), min_length=1)
     """Hidden layers of policy and value network (paper Table I)."""
     learning_rate: float = Field(default=2e-4, gt=0)
     """Initial learning rate of Adam (paper Table I)."""

@@ -111,6 +111,19 @@ def test_a_name_that_reads_as_something_else_is_text_wherever_it_is_read_again(t
     assert load_recipe(kept).recipe == recipe
 
 
+@pytest.mark.parametrize(
+    ("line", "expected"),
+    [
+        ("teacher: {start: full}", "should be a recipe file, as in full.yaml, or the first characters (8 or more)"),
+        ("eval: {lifting: {masses: [-4]}}", "'eval.lifting.masses.0' = -4: should be greater than or equal to 0"),
+        ("teacher: {hidden: []}", "'teacher.hidden' = []: Tuple should have at least 1 item"),
+    ],
+)
+def test_a_wrong_value_is_told_once_with_what_is_valid(tmp_path: Path, line: str, expected: str) -> None:
+    (text,) = problems(tmp_path, f"{line}\n")
+    assert expected in text
+
+
 def test_feedback_on_the_feet_of_a_gait_prior_that_is_off_is_refused(tmp_path: Path) -> None:
     (text,) = problems(tmp_path, "task: {references: {gait: {enabled: false, placement: {}}}}\n")
     assert "placement: moves the feet of the gait prior, which is off" in text

@@ -43,6 +43,7 @@ def test_what_is_wrong_is_named_with_its_place(folder: Path) -> None:
         folder, "seed: 1\nvariants: [full, wo_rg]\n"
     )
     assert "should be a list of 2 to 100 recipes, not of 1" in refused(folder, "variants: [full]\n")
+    assert "should be a list of 2 to 100 recipes, not 'full'" in refused(folder, "variants: full\n")
     assert "not of 20,000" in refused(folder, f"variants: [{'full, ' * 20_000}]\n")
     assert r"'a\x00b' is no recipe's name" in refused(folder, 'variants: [full, "a\\0b"]\n')
     assert "paper.yaml:1:12: key 'variants': 3 is no recipe's name" in refused(folder, "variants: [3, full]\n")

@@ -50,7 +50,8 @@ def load_study(word: str | Path, overrides: Sequence[str] = ()) -> tuple[LoadedR
 def _files(variants: Located, file: Path, problems: list[Problem]) -> list[Path]:
     items = variants.value if isinstance(variants.value, list) else []
     if not 2 <= len(items) <= MOST_VARIANTS:
-        text = f"key 'variants': should be a list of 2 to {MOST_VARIANTS} recipes, not of {len(items):,}"
+        given = f"of {len(items):,}" if isinstance(variants.value, list) else shown(plain(variants))
+        text = f"key 'variants': should be a list of 2 to {MOST_VARIANTS} recipes, not {given}"
         problems.append(Problem(variants.place, text))
         return []
     found = []

@@ -13,7 +13,7 @@ from pydantic_core import ErrorDetails
 from iowbc.errors import PROBLEMS_TOLD, Problem, RecipeError, nearest, shown
 from iowbc.recipe.reading.document import Located, leaves, located, merged, plain
 from iowbc.recipe.recipe import Recipe
-from iowbc.recipe.section import InconsistentValues, NamedEntries
+from iowbc.recipe.section import ARTIFACT_NAME, InconsistentValues, NamedEntries
 
 LARGEST_NUMBER = 1e12
 """Upper bound on every number in a recipe."""
@@ -76,6 +76,8 @@ def _of_its_own(path: Sequence[str]) -> Located:
 def _problems(tree: Located, errors: Sequence[ErrorDetails]) -> list[Problem]:
     """One problem per location and key; messages of the members of a union about the same value are joined."""
     texts: dict[tuple[str, str], dict[str, None]] = {}
+    wrong = {error["loc"][:count] for error in errors for count in range(len(error["loc"]))}
+    errors = [error for error in errors if error["type"] != "too_short" or error["loc"] not in wrong]
     for error in errors[:PROBLEMS_TOLD]:
         for place, head, text in _each_problem(tree, error):
             texts.setdefault((place, head), {})[text] = None  # each text once, in order
@@ -129,6 +131,10 @@ def _problem(tree: Located, error: ErrorDetails) -> tuple[str, str, str]:
         text += "; several values are for `iowbc sweep`"
     if error["type"] == "string_pattern_mismatch" and path == ("name",):
         text = "should be lower-case letters, digits, `-` and `_`; give it as `name:` where the file is named otherwise"
+    if error["type"] == "string_pattern_mismatch" and error.get("ctx", {}).get("pattern") == ARTIFACT_NAME:
+        text = "should be a recipe file, as in full.yaml, or the first characters (8 or more) of an artifact's key"
+    if error["type"] == "int_from_float" and found.place.startswith("--set "):
+        text += "; random draws of a sweep are integers with `whole: true`"
     if error["type"] == "string_type" and isinstance(found.value, (int, float)):
         text = "should be text; in quotes, a word that reads as a number is"
     if error["type"] in ("literal_error", "enum") and isinstance(found.value, str):
