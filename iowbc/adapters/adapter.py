@@ -102,16 +102,15 @@ def validate_adapter(adapter: Adapter, robot: Robot, frequency: float, *, moves_
         raise StageFailed(f"{PLACE}: does not fit the robot {robot.name}: {'; '.join(problems)}")
     try:  # a step of a robot that stands in the default posture
         parts = [np.asarray(term(standing(adapter)), np.float64) for term in adapter.terms]
-    except Exception as error:
-        raise StageFailed(f"{PLACE}: cannot make a step: {type(error).__name__}: {error}") from error
-    for number, values in enumerate(parts):
-        if values.ndim != 2 or len(values) != 1 or not np.isfinite(values).all():
-            text = f"terms: number {number} (from 0) gives {_described(values)} for one robot, expected (1, size)"
-            raise StageFailed(f"{PLACE}: {text} of finite numbers")
-    try:
+        for number, values in enumerate(parts):
+            if values.ndim != 2 or len(values) != 1 or not np.isfinite(values).all():
+                text = f"terms: number {number} (from 0) gives {_described(values)} for one robot"
+                raise StageFailed(f"{PLACE}: {text}, expected (1, size) of finite numbers")
         past = tuple(np.repeat(values[:, None], adapter.history, 1) for values in parts)
         observation = adapter.observed(past).astype(np.float32)
         answer = np.asarray(adapter.network(observation))
+    except StageFailed:
+        raise
     except Exception as error:
         raise StageFailed(f"{PLACE}: cannot make a step: {type(error).__name__}: {error}") from error
     if answer.shape != (1, len(adapter.acted)) or not np.isfinite(answer).all():
