@@ -160,20 +160,23 @@ def test_the_controller_is_found_by_its_recipes_name(tmp_path: Path, monkeypatch
     (export / "contract.json").write_text(json.dumps({}))
     monkeypatch.chdir(tmp_path)
     assert exported_folder("mine") == Path("runs/mine/export")
-    assert exported_folder("nothing") == Path("nothing")
+    with pytest.raises(ContractBroken, match="nothing: neither an export folder nor .* those with one: mine$"):
+        exported_folder("nothing")
     shipped = Path("runs/published/export/0123")
     shipped.mkdir(parents=True)
     (shipped / "contract.json").write_text("{}")
     for text in ("", "[]", '{"name": 3}'):
         (shipped / "recipe.json").write_text(text)
-        assert exported_folder("shipped") == Path("shipped")
+        with pytest.raises(ContractBroken, match="those with one: mine$"):
+            exported_folder("shipped")
     (shipped / "recipe.json").write_text('{"name": "shipped"}')
     assert exported_folder("shipped") == shipped
     (shipped / "recipe.json").write_text('{"name": "mine"}')
     assert exported_folder("mine") == Path("runs/mine/export"), "what was made here comes first"
     assert exported_folder("mine/export") == Path("runs/mine/export")
     assert exported_folder("0123") == shipped, "a key"
-    assert exported_folder("012") == Path("012"), "too few characters of one"
+    with pytest.raises(ContractBroken, match="012: neither an export folder nor"):
+        exported_folder("012")  # too few characters of a key
     for key in ("0123aa", "4567aa"):
         stored = Path("runs/store/export", key)
         stored.mkdir(parents=True)
