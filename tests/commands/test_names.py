@@ -160,14 +160,14 @@ def test_the_controller_is_found_by_its_recipes_name(tmp_path: Path, monkeypatch
     (export / "contract.json").write_text(json.dumps({}))
     monkeypatch.chdir(tmp_path)
     assert exported_folder("mine") == Path("runs/mine/export")
-    with pytest.raises(ContractBroken, match="nothing: neither an export folder nor .* those with one: mine$"):
+    with pytest.raises(ContractBroken, match=r"nothing: neither an export folder nor .* those with one: mine$"):
         exported_folder("nothing")
     shipped = Path("runs/published/export/0123")
     shipped.mkdir(parents=True)
     (shipped / "contract.json").write_text("{}")
     for text in ("", "[]", '{"name": 3}'):
         (shipped / "recipe.json").write_text(text)
-        with pytest.raises(ContractBroken, match="those with one: mine$"):
+        with pytest.raises(ContractBroken, match=r"those with one: mine$"):
             exported_folder("shipped")
     (shipped / "recipe.json").write_text('{"name": "shipped"}')
     assert exported_folder("shipped") == shipped
