@@ -116,6 +116,7 @@ def test_a_name_that_reads_as_something_else_is_text_wherever_it_is_read_again(t
     [
         ("teacher: {start: full}", "should be a recipe file, as in full.yaml, or the first characters (8 or more)"),
         ("eval: {lifting: {masses: [-4]}}", "'eval.lifting.masses.0' = -4: should be greater than or equal to 0"),
+        ("extends: ''", "key 'extends': should be the name of one recipe file"),
         ("teacher: {hidden: []}", "'teacher.hidden' = []: Tuple should have at least 1 item"),
     ],
 )

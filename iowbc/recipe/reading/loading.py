@@ -182,7 +182,7 @@ def _resolve(file: str, above: tuple[str, ...], place: str) -> Located:
     own = Located(entries, tree.place)
     if extends is None:
         return own
-    if not isinstance(extends.value, str) or "\0" in extends.value:
+    if not isinstance(extends.value, str) or not extends.value.strip() or "\0" in extends.value:
         raise RecipeError([Problem(extends.place, "key 'extends': should be the name of one recipe file")])
     parent = file_meant_in(Path(file).parent, extends.value)
     base = _resolve(os.fspath(parent), (*above, file), extends.place)
