@@ -1,5 +1,6 @@
 """`iowbc doctor`: fitness of this machine to run a recipe, and the remedy where it is not fit."""
 
+import contextlib
 import importlib.metadata
 import os
 import platform
@@ -138,6 +139,10 @@ def _robots() -> Iterator[Finding]:
     for folder in folders.values():
         try:
             robot = load_robot(folder)
+            with contextlib.suppress(ImportError):
+                from mujoco import MjModel
+
+                MjModel.from_xml_path(str(robot.mjcf))
         except (OSError, ValueError) as error:
             yield Finding(f"robot {folder.name}", "bad", str(error))
         else:

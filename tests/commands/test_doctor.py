@@ -1,5 +1,7 @@
 """The doctor computes a contact, draws a picture, and fails where something essential does."""
 
+import re
+import shutil
 from pathlib import Path
 
 import pytest
@@ -7,6 +9,7 @@ import typer
 
 from iowbc.commands import doctor
 from iowbc.pipeline.store.runs import Runs
+from iowbc.robot.description import robot_folder
 
 
 def test_this_machine_is_fit(tmp_path: Path) -> None:
@@ -30,8 +33,12 @@ def test_a_crash_of_the_contact_model_is_essential(
 def test_every_robot_is_looked_at(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "robots" / "r2d2").mkdir(parents=True)
     (tmp_path / "robots" / "r2d2" / "robot.yaml").write_text("name: r2d2\n")
+    bent = shutil.copytree(robot_folder("g1"), tmp_path / "robots" / "bent")
+    text = re.sub('diaginertia="[^"]*"', 'diaginertia="1 0.001 0.001"', (bent / "g1.xml").read_text(), count=1)
+    (bent / "g1.xml").write_text(text)
     monkeypatch.chdir(tmp_path)
     found = {finding.name: finding for finding in doctor._robots()}
     assert found["robot g1"].verdict == "good"
     assert found["robot r2d2"].verdict == "bad"
     assert "missing mjcf" in found["robot r2d2"].text
+    assert "inertia must satisfy" in found["robot bent"].text
