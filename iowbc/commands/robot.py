@@ -67,8 +67,8 @@ def robot(
         require_known(name, "check", CHECKS)
     if lockstep and network != "lo":
         raise UsageError("--lockstep is for a simulated robot on this machine (--network lo); a robot does not wait")
-    if log is not None and (dry_run or log.exists()):
-        raise UsageError(f"--log {log}: " + ("--dry-run logs nothing" if dry_run else "exists; name a new file"))
+    if dry_run and log is not None:
+        raise UsageError(f"--log {log}: --dry-run logs nothing")
     controller = Controller.load(exported_folder(what))
     require_known(scene, "scene", [name for name, _ in controller.contract.references.grasps])
     source = operator(commands, controller.contract)

@@ -147,9 +147,9 @@ class Planner:
             text = f"code changed since it was made: {', '.join(changed)}"
             if whole and not artifact.whole:
                 reasons.append(NOT_WHOLE)
-            elif changed and self.options.on_code_change == "rerun":
+            elif changed and self.options.same_code:
                 reasons.append(text)
-            if changed and self.options.on_code_change == "report":
+            if changed and not self.options.same_code:
                 notes.append(text)
             notes.extend(self._cosmetic_notes(stage, artifact))
         return replace(step, artifact=artifact, damage=damage, reasons=tuple(reasons), notes=tuple(notes))
@@ -158,8 +158,8 @@ class Planner:
         """The plan of a stage that runs, with the earlier attempt or the artifact of a shorter run to resume."""
         stage, notes, expected, predecessor = step.stage, list(step.notes), step.expected, None
         record = read_record(Progress, self.store.runs.work / step.key / PROGRESS)
-        forced, rerun = stage.name in self.options.force, self.options.on_code_change == "rerun"
-        if record and record.continues(forced, step.code if rerun else None):
+        forced = stage.name in self.options.force
+        if record and record.continues(forced, step.code if self.options.same_code else None):
             notes.append(", ".join(filter(None, [f"goes on from attempt {record.attempts or 1}", record.share])))
             if record.done and record.total and record.seconds:  # the remaining part at the attempt's rate
                 expected = record.seconds * max(0.0, record.total / record.done - 1.0)
@@ -175,7 +175,7 @@ class Planner:
     def _predecessor(self, step: StagePlan) -> Artifact | None:
         """The undamaged artifact that differs only in a smaller `stage.extends`; of several the longest. None with
         other code where that is to run again."""
-        stage, ingredients, rerun = step.stage, step.ingredients, self.options.on_code_change == "rerun"
+        stage, ingredients, same_code = step.stage, step.ingredients, self.options.same_code
         if stage.extends is None:
             return None
         aim = slice_value(self.deciding, stage.extends, stage)
@@ -185,7 +185,7 @@ class Planner:
             changes = list(differences(nested(old.get("recipe", {})), nested(ingredients["recipe"])))
             alike = all(old.get(name) == ingredients[name] for name in ("version", "inputs", "robot"))
             there = not set(stage.extends_from) & set(artifact.manifest.omitted)
-            there = there and not (rerun and changed_code(artifact.manifest.code, step.code))
+            there = there and not (same_code and changed_code(artifact.manifest.code, step.code))
             if alike and there and [path for path, _, _ in changes] == [stage.extends] and changes[0][1] < aim:
                 ends[changes[0][1]] = artifact
         for end in sorted(ends, reverse=True):

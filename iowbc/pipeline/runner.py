@@ -174,8 +174,8 @@ class Runner:
         stage, key, view = step.stage, workspace.key, self.views[step.stage.name]
         ingredients, resolved = step.ingredients, as_yaml(self.loaded.recipe)
         forced = stage.name in self.options.force
-        rerun, code = self.options.on_code_change == "rerun", dict(step.code)
-        earlier = workspace.begin(self.loaded.recipe.name, forced, code, self.command(), same_code=rerun)
+        name, code, same_code = self.loaded.recipe.name, dict(step.code), self.options.same_code
+        earlier = workspace.begin(name, forced, code, self.command(), same_code=same_code)
         describe(workspace.root, ingredients, resolved)
         view.record, view.began = workspace.state, time.monotonic() - workspace.seconds
         self._show(stage.name, "runs", short(step.notes or step.reasons, 1))

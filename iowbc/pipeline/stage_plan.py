@@ -28,6 +28,11 @@ class Options:
     address: str | None = None
     on_code_change: Literal["report", "rerun"] = "report"
 
+    @property
+    def same_code(self) -> bool:
+        """True if only what the present code made is used."""
+        return self.on_code_change == "rerun"
+
 
 @dataclass(frozen=True)
 class StagePlan:
