@@ -13,7 +13,7 @@ from iowbc.pipeline.stage_plan import Options
 from iowbc.pipeline.store.runs import Runs, require_writable_runs
 from iowbc.pipeline.store.store import Store
 
-LARGEST_REPOSITORY = 45_000_000
+LARGEST_REPOSITORY = 30_000_000
 """Maximum size of all published files [bytes], so that cloning stays fast."""
 
 

@@ -45,15 +45,12 @@ class Planner:
         known, steps = {} if known is None else known, dict[str, StagePlan]()
         if self in known:
             return known[self]
+        borrowed = {stage.name: self.borrowed(stage, known) for stage in self.stages}
         for stage in self.stages:
             inputs = {
                 name: steps[name].artifact if steps[name].cached else None for name in stage.reads(self.loaded.recipe)
             }
-            borrowed = self.borrowed(stage, known)
-            step = self.decide(stage, {**inputs, **borrowed})
-            if not step.cached and self._want_whole(stage, borrowed):
-                known.clear()
-                return self.plan(known)
+            step = self.decide(stage, {**inputs, **borrowed[stage.name]})
             unknown = [name for name in inputs if not steps[name].cached and steps[name].expected is None]
             steps[stage.name] = replace(step, expected=None, roughly=step.guess) if unknown else step
         for stage in reversed(self.stages):
@@ -62,6 +59,10 @@ class Planner:
                 if not steps[stage.name].cached and step.cached and made is not None and not made.whole:
                     timed = estimated(step, self.store.artifacts(name), made)
                     steps[name] = replace(timed, reasons=(f"{NOT_WHOLE}; {stage.name} reads it",))
+        running = [stage for stage in self.stages if not steps[stage.name].cached]
+        if any([self._want_whole(stage, borrowed[stage.name]) for stage in running]):
+            known.clear()
+            return self.plan(known)
         known[self] = list(steps.values())
         return known[self]
 

@@ -140,7 +140,7 @@ def test_a_repository_that_grows_too_large_is_warned_of(cloned: Workplace) -> No
         large.truncate(LARGEST_REPOSITORY)
     done = cloned.command("publish", "small.yaml")
     assert done.code == 0
-    assert "warning: a repository should carry no more than 45.0 MB; remove what is out of date" in done.output
+    assert "warning: a repository should carry no more than 30.0 MB; remove what is out of date" in done.output
 
 
 def test_publishing_brings_back_what_a_death_left_and_removes_the_rest(

@@ -1,6 +1,7 @@
 """A stage that begins from an artifact which another recipe made."""
 
 import json
+import re
 import shutil
 from collections import Counter
 from dataclasses import replace
@@ -131,6 +132,8 @@ def test_the_recipe_that_it_begins_from_runs_again_where_it_was_published_withou
         workplace.store.publish(artifact, ["result.json"])
     shutil.rmtree(workplace.store.runs.store / "teacher")
     assert "all stages are cached" in workplace.command("plan", second, "--until", "teacher").output
+    later = workplace.command("plan", second).output
+    assert re.search(r"^small .* cached +cached +[0-9.]+ s", later, re.MULTILINE), "its distill reads second's teacher"
     refused = workplace.command("sweep", second, "--until", "teacher", "--set", "teacher.gamma=0.8,0.7")
     assert refused.code == 2
     (command,) = [line for line in refused.errors.splitlines() if "iowbc run" in line]
