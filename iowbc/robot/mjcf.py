@@ -243,7 +243,7 @@ def _hinge(element: ElementTree.Element) -> Hinge:
 
 
 def _capsule(element: ElementTree.Element) -> Capsule:
-    radius = float(element.attrib["size"].split()[0])
+    radius = _numbers(element, "size", len(element.get("size", "").split()) or 1)[0].item()
     name = element.attrib.get("name", "")
     if "fromto" in element.attrib:
         ends = _numbers(element, "fromto", 6)

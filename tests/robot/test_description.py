@@ -157,6 +157,7 @@ def test_an_unknown_column_of_a_joint_is_refused(folder: Path) -> None:
             r"has the range '-180 180', expected two angles in radians",
         ),
         ("g1.xml", ' actuatorfrcrange="', ' actuatorfrcrange="0 0" name2="', r"expected a largest torque above 0"),
+        ("g1.xml", ' size="0.07"', "", r"<geom size=''> of 'pelvis': expected 1 finite number"),
         ("robot.yaml", "linkages:", "linkages:\nold:", r"unknown entry old"),
     ],
 )
