@@ -26,7 +26,7 @@ def largest_difference(folder: Path) -> float:
         if state is None:
             (state,) = settle.run(["state"], {name: measured[name] for name in contract["settle"]})
         target, state = step.run(["target", "state_next"], measured | {"state": state})
-        away = max(away, float(np.abs(target[0] - expected).max()))
+        away = max(away, float(np.nan_to_num(np.abs(target[0] - expected), nan=np.inf).max()))
     return away
 
 

@@ -14,7 +14,7 @@ from iowbc.commands import options
 from iowbc.commands.printed import plain_table, stdout_console, tell
 from iowbc.deploy.controller import Controller
 from iowbc.deploy.exported_folder import exported_folder
-from iowbc.errors import UsageError, require_known
+from iowbc.errors import Interrupted, UsageError, require_known
 from iowbc.evaluation.play_request import HEAVIEST
 from iowbc.onboard.checks import CHECKS, LIMITS, CheckResult, checks
 from iowbc.onboard.machine import Machine
@@ -72,17 +72,19 @@ def robot(
     controller = Controller.load(exported_folder(what))
     require_known(scene, "scene", [name for name, _ in controller.contract.references.grasps])
     source = operator(commands, controller.contract)
-    poses = None if object_pose is None else Udp(Ranges(controller.contract), udp_port(object_pose, "--object-pose"))
+    ranges = Ranges(controller.contract)
+    if object_pose is not None and not ranges.seen:
+        raise UsageError(f"--object-pose {object_pose}: {controller.contract.recipe} does not observe the object")
+    poses = None if object_pose is None else Udp(ranges, udp_port(object_pose, "--object-pose"))
     stop = _stop_request()
     bus = DdsBus(network, domain)
     with ExitStack() as stack:
         stack.callback(bus.close)
         tell(console, f"{controller.contract.recipe}: listening on {network} for {LISTENING:g} s")
-        standing = Ranges(controller.contract).standing
         heard = listen(bus, LISTENING, stop.is_set)
         if stop.is_set():
-            return
-        found = checks(controller, heard, scene, standing, LIMITS)
+            raise Interrupted("stopped before the checks; no motor command was sent")
+        found = checks(controller, heard, scene, ranges.standing, LIMITS)
         own_pace = ("states",) if lockstep and heard.states else ()
         report_checks(console, found, (*(waive or ()), *own_pace))
         if dry_run:
@@ -103,6 +105,7 @@ def robot(
         source.wanted(0.0, None)  # discard keys from before the robot was ready
         pace = "in step with the simulated robot" if lockstep else enable_realtime()
         origin = f"udp:{source.port}" if isinstance(source, Udp) else commands
+        origin += "" if poses is None else f"; object pose from udp:{poses.port}"
         tell(console, f"{pace}; zero torque; commands from {origin}; Ctrl+C damps and ends")
         clock: Clock = LockStep() if lockstep else MonotonicClock()
         times = drive(
@@ -110,6 +113,7 @@ def robot(
             Machine(controller, scene),
             source if poses is None else OperatorWithPoses(source, poses),
             clock,
+            charge=None if heard.battery is None else float(heard.battery["soc"]),
             seconds=seconds,
             log=writer,
             tell=lambda text: tell(console, text),

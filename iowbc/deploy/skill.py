@@ -108,6 +108,10 @@ class Skill:
             raise ContractBroken(f"{folder}: {contract.frequency} Hz is no whole part of {controller.frequency} Hz")
         with readable(folder / GRAPH):
             session = open_session(folder / GRAPH)
+            traced = session.get_modelmeta().custom_metadata_map.get("contract", "{}")
+            if SkillContract.model_validate_json(traced) != contract.model_copy(update={"files": {}}):
+                text = f"differs from the contract with which {GRAPH} was made; export again"
+                raise ContractBroken(f"{folder / CONTRACT}: {text}")
             sizes = [tuple(port.shape[1:]) for port in (*session.get_inputs(), *session.get_outputs())]
         if sizes != [(contract.observation,), (len(nominal_command(contract.commands)),)]:
             raise ContractBroken(f"{folder / GRAPH}: shapes are {sizes}, not those of the contract; export again")

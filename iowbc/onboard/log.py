@@ -3,6 +3,7 @@
 All messages of a cycle of the loop share a time stamp: first `inputs`, last the low-level command.
 """
 
+import contextlib
 import json
 import os
 import queue
@@ -160,11 +161,23 @@ def read_messages(path: Path) -> Iterator[tuple[str, float, bytes]]:
                 raise Damaged(f"{path}: {type(error).__name__}: {error}") from error
 
 
+@contextlib.contextmanager
+def _of_this_version(path: Path) -> Iterator[None]:
+    """Raises Damaged where the content of a log is not that of this version."""
+    try:
+        yield
+    except (KeyError, TypeError, ValueError) as error:
+        text = f"content that this version does not read: {type(error).__name__}: {error}"
+        raise Damaged(f"{path}: {text}; the log may be of another version of iowbc") from error
+
+
 def read_states(path: Path) -> Iterator[tuple[float, State]]:
     """Time [s] and state at each event, in order. Raises Damaged and UsageError."""
     for topic, time, data in read_messages(path):
         if topic == "event":
-            yield time, State(json.loads(data)["state"])
+            with _of_this_version(path):
+                state = State(json.loads(data)["state"])
+            yield time, state
 
 
 def read_cycles(path: Path) -> Iterator[tuple[CycleInputs, Record]]:
@@ -172,12 +185,16 @@ def read_cycles(path: Path) -> Iterator[tuple[CycleInputs, Record]]:
     inputs: dict[str, Any] | None = None
     states: list[Record] = []
     for topic, _, data in read_messages(path):
-        if topic == "inputs":
-            inputs, states = json.loads(data), []
-        elif topic == TOPICS[LOW_STATE]:
-            states.append(from_cdr(LOW_STATE, data))
-        elif topic == TOPICS[LOW_COMMAND] and inputs is not None:
-            yield _inputs(inputs, states), from_cdr(LOW_COMMAND, data)
+        cycle = None
+        with _of_this_version(path):
+            if topic == "inputs":
+                inputs, states = json.loads(data), []
+            elif topic == TOPICS[LOW_STATE]:
+                states.append(from_cdr(LOW_STATE, data))
+            elif topic == TOPICS[LOW_COMMAND] and inputs is not None:
+                cycle = _inputs(inputs, states), from_cdr(LOW_COMMAND, data)
+        if cycle is not None:
+            yield cycle
 
 
 def _inputs(logged: dict[str, Any], states: list[Record]) -> CycleInputs:
@@ -212,9 +229,10 @@ def replay(path: Path, folder: Path) -> tuple[int, int]:
     for a file that is no log."""
     about = read_about(path)
     controller = Controller.load(folder)
-    if export_digest(controller) != about["export"]:
-        raise UsageError(f"{path}: logged with another export ({about['recipe']}); give the folder of that one")
-    machine = Machine(controller, about["scene"], SafetyLimits.model_validate_json(about["limits"]))
+    with _of_this_version(path):
+        if export_digest(controller) != about["export"]:
+            raise UsageError(f"{path}: logged with another export ({about['recipe']}); give the folder of that one")
+        machine = Machine(controller, about["scene"], SafetyLimits.model_validate_json(about["limits"]))
     turns = different = 0
     for given, command in read_cycles(path):
         turns += 1

@@ -149,7 +149,8 @@ def single_keys() -> Iterator[None]:
     try:
         yield
     finally:
-        termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)
+        with contextlib.suppress(termios.error):  # the terminal may be gone
+            termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)
 
 
 class Datagram(Section):
@@ -173,7 +174,8 @@ class Datagram(Section):
 
 class Udp:
     """JSON datagrams at a local port; see `Datagram`. Of datagrams that cannot be parsed only a request to damp counts;
-    those with `seen` alone are no commands."""
+    those with `seen` alone are no commands. A request counts once until a command has another or none, except to damp,
+    so that a sender that repeats its request does not undo a watchdog's damping."""
 
     def __init__(self, ranges: Ranges, port: int) -> None:
         self.ranges = ranges
@@ -185,6 +187,8 @@ class Udp:
         self._socket.setblocking(False)
         self.port: int = self._socket.getsockname()[1]
         self._wanted = OperatorRequest(ranges.standing, -np.inf)
+        self._requested: State | None = None
+        """Request of the last command."""
 
     def wanted(self, now: float, state: Record | None) -> OperatorRequest:
         request = None
@@ -196,10 +200,13 @@ class Udp:
                     if isinstance(content, dict) and content.get("request") == State.DAMPING:
                         request = State.DAMPING  # whatever else is wrong
                     given = Datagram.model_validate(content)
-                    request = State.DAMPING if request is State.DAMPING else given.request or request
                     self._wanted = self._given(given, now)
-        last = self._wanted
-        return replace(last, request=request)
+                    if given.model_fields_set == {"seen"}:
+                        continue
+                    if request is not State.DAMPING and given.request is not self._requested:
+                        request = given.request or request
+                    self._requested = given.request
+        return replace(self._wanted, request=request)
 
     def discard(self) -> None:
         with contextlib.suppress(BlockingIOError):

@@ -26,6 +26,8 @@ PATIENCE = 1.0
 """Timeout for the next state in lock step [s]."""
 DISCOVERY = 10.0
 """Timeout for the first state [s]: participants discover each other within some seconds."""
+POLLING = 0.1
+"""Period of checks for a stop while no state has arrived [s]."""
 FINAL_DAMPING = 0.5
 """Duration of damping at the end [s]."""
 REALTIME_PRIORITY = 60
@@ -106,8 +108,10 @@ def listen(bus: "DdsBus", seconds: float, stopped: Callable[[], bool] = lambda: 
     states: list[Record] = []
     battery: Record | None = None
     others = 0
-    if not bus.wait(messages.LOW_STATE, DISCOVERY):
-        return BusSnapshot([], DISCOVERY, None, 0, None)
+    begin = time.monotonic()
+    while not bus.wait(messages.LOW_STATE, POLLING):
+        if stopped() or time.monotonic() - begin > DISCOVERY:
+            return BusSnapshot([], DISCOVERY, None, 0, None)
     begin = time.monotonic()
     while (spent := time.monotonic() - begin) < seconds and not stopped():
         bus.wait(messages.LOW_STATE, 0.01)
@@ -137,12 +141,14 @@ def drive(
     operator: Operator,
     clock: Clock,
     *,
+    charge: float | None = None,
     seconds: float = float("inf"),
     log: LogWriter | None = None,
     tell: Callable[[str], None] = print,
     stopped: Callable[[], bool] = lambda: False,
 ) -> Times:
-    """Drives the robot until `stopped` or for some time [s], and damps it at the end, also after an error."""
+    """Drives the robot until `stopped` or for some time [s], and damps it at the end, also after an error. `charge`:
+    battery charge during the checks [%]."""
     turns = 0
     begin: float | None = None
     leaving: float | None = None
@@ -159,8 +165,8 @@ def drive(
             if leaving is not None:
                 wanted = replace(wanted, request=State.DAMPING)
             batteries = bus.take(messages.BATTERY_STATE)
-            charge = float(batteries[-1]["soc"]) if batteries else None
-            given = CycleInputs(now, states, wanted, others, charge)
+            charge = float(batteries[-1]["soc"]) if batteries else charge
+            given, charge = CycleInputs(now, states, wanted, others, charge), None
             command = machine.turn(given)
             bus.publish(command)
             for event in machine.events:

@@ -11,6 +11,8 @@ from iowbc.robot import rotations
 
 SILENCE = 1.0
 """Time without a new state after which the robot may have restarted [s]; a robot that moved is damped long before."""
+LARGEST_DISORDER = 100
+"""Difference of ticks beyond which an earlier state is of another robot, and not merely out of order [ms]."""
 CLOCK_DRIFT = 2e-4
 """Clock drift between the robot and this machine that does not count as delay [s/s]."""
 
@@ -71,6 +73,8 @@ class Sensors:
         """Arrival time of the newest state [s]."""
         self.changed = dict.fromkeys(("imu_state", "motor_state"), -np.inf)
         """Time of the last state in which each part has other values than in the one before [s]."""
+        self.mixed = -np.inf
+        """Time of the last state that another robot seems to have sent [s]."""
         self.late = 0.0
         """Its delay beyond the smallest one so far, by the robot's clock [s]."""
         self._least, self._least_at = np.inf, 0.0
@@ -78,6 +82,8 @@ class Sensors:
     def take(self, states: tuple[Record, ...], now: float) -> None:
         """Processes the states that arrived, oldest first, at `now` [s]."""
         for state in states:
+            if self.state is not None and int(self.state["tick"]) - int(state["tick"]) > LARGEST_DISORDER:
+                self.mixed = now if now - self.at < SILENCE else self.mixed
             if self._repeated(state, now):
                 continue
             if self.state is not None and state["tick"] < self.state["tick"]:

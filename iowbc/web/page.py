@@ -35,8 +35,8 @@ SCENES = "scenes.json"
 def write_page(exported: Path, out: Path, cache: Path, say: Callable[[str], None]) -> None:
     """Write a page with an exported controller, and all that it needs, into `out`; `cache`: folder of npm's packages.
     Raises ContractBroken for a damaged export, UsageError without npm."""
-    parts = npm_parts(cache, say)
     world = exported_world(exported)
+    parts = npm_parts(cache, say)
     scenes = web_scenes(world, load_robot(world.robot))
     first = next((name for name, _ in accepted(world.recipe)), FREE)
     golden = None

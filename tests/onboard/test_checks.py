@@ -54,6 +54,17 @@ def test_what_the_bus_carried_is_checked(still: Still, other: dict[str, Any], na
     assert failed(still, replace(heard(still), **other)) == [name]
 
 
+@pytest.mark.parametrize("apart", [0, 5000])
+def test_the_states_of_two_robots_are_refused(still: Still, apart: int) -> None:
+    listened = heard(still)
+    other = [state.copy() for state in listened.states]
+    for state in other:
+        state["tick"] += apart
+        state["imu_state"]["gyroscope"] += 0.1
+    mixed = [state for pair in zip(listened.states, other, strict=True) for state in pair]
+    assert failed(still, replace(listened, states=mixed)) == ["states"]
+
+
 def test_a_low_battery_is_refused(still: Still) -> None:
     listened = heard(still)
     assert listened.battery is not None

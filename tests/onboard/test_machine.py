@@ -252,6 +252,16 @@ def test_a_robot_that_restarts_is_followed_again_and_one_wrong_tick_is_forgotten
     assert still.machine.state is State.RUN
 
 
+def test_states_of_a_second_robot_damp(still: Still) -> None:
+    still.until(State.RUN)
+    own, other = still.state(), still.state()
+    other["tick"] -= 500
+    still.turn(states=(own, other))
+    assert still.machine.events[0].startswith("damping: states of two robots")
+    still.turn(State.STAND)
+    assert "stand refused: states of two robots" in still.machine.events[0]
+
+
 def test_the_heading_counts_from_the_first_that_is_a_number(still: Still) -> None:
     state = still.state()
     state["imu_state"]["quaternion"] = 0.0

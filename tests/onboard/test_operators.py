@@ -193,6 +193,16 @@ def test_damping_wins_over_requests_that_follow_it(source: Udp) -> None:
     assert source.wanted(0.0, None).request is State.DAMPING
 
 
+def test_a_repeated_request_counts_once(source: Udp) -> None:
+    given = [b'{"request": "stand"}', b'{"request": "stand"}', b'{"seen": {}}', b'{"request": "stand"}', b"{}"]
+    found = []
+    for data in (*given, *given[:1], b'{"request": "damping"}', b'{"request": "damping"}'):
+        send(source, data)
+        found.append(source.wanted(0.0, None).request)
+    stand, damping = State.STAND, State.DAMPING
+    assert found == [stand, None, None, None, None, stand, damping, damping]
+
+
 @pytest.mark.parametrize("data", [b'{"request": "damping", "velocity": [0.3]}', b'{"request": "damping", "yaw": 0}'])
 def test_a_request_to_damp_counts_whatever_else_is_wrong(source: Udp, data: bytes) -> None:
     send(source, data)

@@ -11,10 +11,10 @@ from still import Still
 
 from iowbc.errors import Damaged
 from iowbc.onboard import messages
-from iowbc.onboard.log import LogWriter, is_cut, read_messages
+from iowbc.onboard.log import LogWriter, is_cut, read_cycles, read_messages, read_states
 from iowbc.onboard.machine import OperatorRequest, State
-from iowbc.onboard.messages import Record
-from iowbc.onboard.process import FINAL_DAMPING, PERIOD, LockStep, drive
+from iowbc.onboard.messages import LOW_COMMAND, TOPICS, Record, to_cdr
+from iowbc.onboard.process import FINAL_DAMPING, PERIOD, LockStep, drive, listen
 
 
 class Bus:
@@ -90,6 +90,18 @@ def test_in_lock_step_time_goes_on_when_the_robot(ticks: tuple[int | None, ...],
     assert [clock.turn(bus)[0] for _ in range(4)] == pytest.approx(times)
 
 
+def test_a_battery_that_is_silent_after_the_checks_is_missed(still: Still) -> None:
+    told: list[str] = []
+    still.machine.limits = still.machine.limits.model_copy(update={"battery_age": 0.1})
+    driven(still, 200, tell=told.append, charge=80.0)
+    assert sum("warning: no battery message for 0 s, the last said 80 %" in line for line in told) == 1
+
+
+def test_listening_ends_when_it_is_stopped() -> None:
+    bus: Any = SimpleNamespace(wait=lambda kind, seconds: False)
+    assert listen(bus, 3.0, lambda: True).states == []
+
+
 def test_a_full_disk_ends_the_log_alone(still: Still, tmp_path: Path) -> None:
     told: list[str] = []
     with LogWriter(tmp_path / "log.mcap", {}) as log:
@@ -114,6 +126,16 @@ def test_a_log_that_cannot_be_finished_is_told_and_closed(tmp_path: Path) -> Non
         log._writer.finish = full  # type: ignore[method-assign]
     assert log.failure == "No space left on device"
     assert file.closed
+
+
+def test_a_log_of_another_version_is_refused(still: Still, tmp_path: Path) -> None:
+    with LogWriter(tmp_path / "log.mcap", {}) as log:
+        log.add("inputs", 0.0, command=[0.0] * 11, request="crawl")
+        log.put((TOPICS[LOW_COMMAND], 0.0, to_cdr(still.turn())))
+        log.add("event", 0.0, text="crawl", state="crawl")
+    for read in (read_states, read_cycles):
+        with pytest.raises(Damaged, match=r"log\.mcap: content .* may be of another version"):
+            list(read(tmp_path / "log.mcap"))
 
 
 def test_a_cut_log_is_known_and_a_damaged_one_refused(still: Still, tmp_path: Path) -> None:

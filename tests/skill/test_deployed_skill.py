@@ -1,5 +1,6 @@
 """The exported skill beside the exported controller sees what the robot sees in the game, and commands the same."""
 
+import json
 import shutil
 from contextlib import closing
 from dataclasses import fields, replace
@@ -176,6 +177,14 @@ def test_one_bad_sample_does_not_change_what_the_skill_commands(
 def test_a_changed_file_is_refused(folder: Path, controller: Controller, name: str) -> None:
     (folder / name).write_bytes((folder / name).read_bytes() + b"x")
     with pytest.raises(ContractBroken, match="changed or damaged"):
+        Skill.load(folder, controller)
+
+
+def test_a_changed_contract_is_refused(folder: Path, controller: Controller) -> None:
+    contract = json.loads((folder / CONTRACT).read_text())
+    contract["robot"]["velocity"] = [10.0 * value for value in contract["robot"]["velocity"]]
+    (folder / CONTRACT).write_text(json.dumps(contract))
+    with pytest.raises(ContractBroken, match="differs from the contract with which skill.onnx was made"):
         Skill.load(folder, controller)
 
 

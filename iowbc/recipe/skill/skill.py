@@ -24,7 +24,7 @@ class SkillEvaluation(Section):
 
     label: str = Field(default="MAPPO", min_length=1, max_length=40)
     """Name of this recipe's skill in tables and figures."""
-    rivals: tuple[Rival, ...] = ("lead", "follow")
+    rivals: Annotated[tuple[Rival, ...], Distinct] = ("lead", "follow")
     """Rule-based baselines. `nominal`: the nominal command, which leads or follows. `lead`: a scripted leader that
     always knows the path. `follow`: an admittance follower. `clock`: the path by time. `stand`: standing still."""
     others: dict[str, tuple[ArtifactName, ...]] = Field(default_factory=dict, json_schema_extra=COSMETIC)
