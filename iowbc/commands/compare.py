@@ -17,8 +17,11 @@ from iowbc.commands.playable import evaluated_actor
 from iowbc.commands.printed import film_progress, print_json, shown_path, stdout_console, tell
 from iowbc.commands.results import PROBE, TRIALS, split_tables
 from iowbc.errors import UsageError
+from iowbc.files import data_digest
 from iowbc.pipeline.console.display import sparkline
+from iowbc.pipeline.console.wording import KEY_LENGTH
 from iowbc.pipeline.store.last_used import require_whole
+from iowbc.pipeline.store.locks import lock_path, named_lock
 from iowbc.pipeline.store.runs import Runs, require_writable
 from iowbc.pipeline.store.store import Store
 from iowbc.report.runs import Group, Run, grouped, metrics_table, trainings_table
@@ -66,14 +69,17 @@ def write_comparison(
     if film and len(tried) < 2:
         raise UsageError("--film shows evaluated runs side by side: two or more must have finished the stage eval")
     require_whole(store.runs, (artifact for run in found for artifact in run.artifacts.values()))
-    start_comparison([run.label for run in found], output)
-    metrics = metrics_table(grouped(found))
-    (output / "metrics.md").write_text(markdown(metrics), encoding="utf-8")
     missing = [name for name in members_of(study) if name not in {run.label for run in tried}]
-    report_joint(found, output, missing, least=1 if study else 2)
-    if film:
-        _film(store, console, tried, output / FILM, quiet=as_json)
-    curves = _learning_curves(found, output)
+    if tried and not study:
+        missing = [run.label for run in found if "eval" not in run.artifacts]
+    metrics = metrics_table(grouped(found))
+    with named_lock(lock_path(store.runs, f"compare-{data_digest(str(output.resolve()))[:KEY_LENGTH]}")):
+        start_comparison([run.label for run in found], output)
+        (output / "metrics.md").write_text(markdown(metrics), encoding="utf-8")
+        report_joint(found, output, missing, least=1 if study else 2)
+        if film:
+            _film(store, console, tried, output / FILM, quiet=as_json)
+        curves, tables = _learning_curves(found, output), read_tables(output / "tables")
     if as_json:
         rows = [
             {"stage": stage, "run": run.label, **artifact.metrics}
@@ -83,13 +89,13 @@ def write_comparison(
         files = [path for part in (output, *(output / name for name in COMPARED)) for path in part.glob("*.*")]
         print_json(console, {"metrics": rows, "files": [shown_path(path) for path in sorted(files)]})
         return
-    for table in (metrics, *read_tables(output / "tables")):
+    for table in (metrics, *tables):
         console.print(drawn(table, console.width) if table.rows else "no metric differs")
         console.print()
     _print_curves(curves, console)
     if missing:
-        text = f"not compared, for their eval has not run: {', '.join(missing)}; `iowbc plan {study}` says how long "
-        tell(console, f"{text}that takes")
+        text = f"not compared, for their eval has not run: {', '.join(missing)}"
+        tell(console, f"{text}; `iowbc plan {study or missing[0]}` says how long that takes")
     for path in (path for path in sorted(output.iterdir()) if path.is_file()):
         tell(console, shown_path(path))
     for part in (output / name for name in COMPARED):
@@ -197,13 +203,15 @@ def _with_unique_labels(
     import pandas as pd
 
     from iowbc.evaluation.report.aggregate import TRAINING
+    from iowbc.evaluation.report.columns import STANDS_STILL
 
     tables = {run.label: pd.read_parquet(run.artifacts["eval"].folder / name) for run in runs}
     groups = grouped(runs) if together else [Group(run.label, (run,)) for run in runs]
     own = [str(tables[group.runs[0].label]["variant"].iloc[0]) for group in groups]
     labels: dict[str, str] = {}
     for group, label in zip(groups, own, strict=True):
-        called = label if own.count(label) == 1 else group.runs[0].label
+        taken = {other.runs[0].label for other in groups if other is not group} | {STANDS_STILL}
+        called = label if own.count(label) == 1 and label not in taken else group.runs[0].label
         labels |= {} if called == label else {called: label}
         for run, seed in zip(group.runs, group.seeds, strict=True):
             tables[run.label] = tables[run.label].assign(variant=called, **{TRAINING: seed})
@@ -212,8 +220,8 @@ def _with_unique_labels(
 
 def report_joint(found: Sequence[Run], output: Path, missing: Sequence[str] = (), least: int = 1) -> None:
     """Write tables and figures over all trials of the runs, a shared evaluation once, if `least` runs or more have any;
-    also of all probed runs: how well the object's mass can be read from their histories. `missing`: recipes of the
-    study that have not run. Raises `UsageError` where the runs count masses differently."""
+    also of all probed runs: how well the object's mass can be read from their histories. `missing`: recipes that have
+    no evaluation. Raises `UsageError` where the runs count masses differently."""
     import pandas as pd
 
     from iowbc.evaluation.report.probe import write_probe

@@ -3,7 +3,7 @@
 import shutil
 import time
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from contextlib import closing
+from contextlib import closing, nullcontext, suppress
 from pathlib import Path
 from secrets import token_hex
 from typing import Annotated, Any
@@ -18,7 +18,7 @@ from iowbc.errors import UsageError, require_known
 from iowbc.files import OLD
 from iowbc.pipeline.store.artifact import INGREDIENTS, Artifact
 from iowbc.pipeline.store.last_used import ever_used, record_path, remove_dangling
-from iowbc.pipeline.store.locks import holder
+from iowbc.pipeline.store.locks import holder, lock_path, named_lock
 from iowbc.pipeline.store.runs import Runs, read_json, require_writable_runs
 from iowbc.pipeline.store.store import PUBLISHING, Store
 from iowbc.pipeline.store.workspace import unfinished
@@ -59,21 +59,22 @@ def gc(
     if store.runs.root.exists() and not dry_run:
         require_writable_runs(store.runs)
     total = 0
-    for path in dict.fromkeys(_to_remove(store, unused, recipes or (), work, damaged, older_than)):
-        if older_than and time.time() - path.stat().st_mtime < older_than * DAY:
-            continue
-        count = sum(file.stat().st_size for file in (path, *path.rglob("*")) if file.is_file())
-        total += count
-        verb = "would remove" if dry_run else "removed"
-        if path.is_dir() and not dry_run:
-            doomed = path.with_name(REMOVING + token_hex(8))
-            path.rename(doomed)  # it disappears from its place at once, then its files
-            shutil.rmtree(doomed)
-        elif not dry_run:
-            path.unlink()
-        tell(console, f"{verb} {shown_path(path)} ({decimal(count)})")
-    if not dry_run:
-        remove_dangling(store.runs)
+    with nullcontext() if dry_run else named_lock(lock_path(store.runs, "gc")):
+        for path in dict.fromkeys(_to_remove(store, unused, recipes or (), work, damaged, older_than)):
+            if older_than and time.time() - path.stat().st_mtime < older_than * DAY:
+                continue
+            count = sum(file.stat().st_size for file in (path, *path.rglob("*")) if file.is_file())
+            total += count
+            verb = "would remove" if dry_run else "removed"
+            if path.is_dir() and not dry_run:
+                doomed = path.with_name(REMOVING + token_hex(8))
+                path.rename(doomed)  # it disappears from its place at once, then its files
+                shutil.rmtree(doomed)
+            elif not dry_run:
+                path.unlink()
+            tell(console, f"{verb} {shown_path(path)} ({decimal(count)})")
+        if not dry_run:
+            remove_dangling(store.runs)
     console.print(f"{decimal(total)} in all", highlight=False)
 
 
@@ -84,7 +85,8 @@ def _to_remove(
     for recipe in recipes:
         require_known(recipe, "recipe that has run", known)
     own = [artifact for artifact in store.artifacts() if not artifact.published]
-    attempts = [read_json(folder / INGREDIENTS) for folder, _ in unfinished(runs) if holder(runs, folder.name)]
+    kept = [folder for folder, _ in unfinished(runs) if not work or holder(runs, folder.name)]
+    attempts = [read_json(folder / INGREDIENTS) for folder in kept]
     free = [
         one for one in own if not holder(runs, one.manifest.key) and not any(_reads(each, one) for each in attempts)
     ]
@@ -101,11 +103,13 @@ def _to_remove(
             restorable = path.suffix == OLD and not path.with_name(key).exists()
             if not restorable and not holder(runs, key) and not holder(runs, PUBLISHING):
                 yield path
-    others = {key for name in known if name not in recipes for key in ever_used(runs, name)}
-    others |= _lent(own, others)
+    if recipes:
+        others = {key for name in known if name not in recipes for key in ever_used(runs, name)}
+        others |= _lent(own, others)
     for recipe in recipes:
-        keys = ever_used(runs, recipe).keys() - others
-        yield from (artifact.folder for artifact in free if artifact.manifest.key in keys)
+        with suppress(UsageError):  # of a damaged record, which goes alone
+            keys = ever_used(runs, recipe).keys() - others
+            yield from [artifact.folder for artifact in free if artifact.manifest.key in keys]
         yield record_path(runs, recipe)
     if work:
         yield from (folder for folder, _ in unfinished(runs) if not holder(runs, folder.name))

@@ -75,8 +75,11 @@ def finished_recipes(store: Store) -> list[str]:
 
 def known_names(store: Store) -> dict[str, tuple[str, ...]]:
     """Recipes that `named` accepts, alphabetically, with the stages of each that can be named."""
-    published = _published(store)
-    return {name: tuple(_recipe(store, name, name, published).usable) for name in finished_recipes(store)}
+    published, found = _published(store), dict[str, tuple[str, ...]]()
+    for name in finished_recipes(store):
+        with contextlib.suppress(UsageError):  # of a damaged record
+            found[name] = tuple(_recipe(store, name, name, published).usable)
+    return found
 
 
 def last_used(store: Store, recipe: str) -> dict[str, Artifact]:

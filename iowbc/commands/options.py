@@ -18,6 +18,7 @@ EXTRAS = {
     "web": ("viser",),
     "robot": ("cyclonedds", "mcap"),
     "cluster": ("ray",),
+    "drake": ("pydrake",),
 }
 """Modules of the larger packages that each extra of iowbc brings; they come together."""
 HOST = "127.0.0.1"

@@ -61,6 +61,7 @@ def run_request(request: Request, console: Console, manner: Manner) -> int:
     the exit code. Raises `RecipeError`."""
     ready = planners(request)
     options.require_extra("train", "iowbc run")
+    require_engine(ready)
     require_writable_runs(request.runs)
     try:
         with (
@@ -85,6 +86,14 @@ def run_request(request: Request, console: Console, manner: Manner) -> int:
     if len(ready) > 1 and request.options.until is None and manner != "quiet":
         compare_variants(request, done, console, ready[0].loaded.recipe.execution.track)
     return DONE
+
+
+def require_engine(planners: Sequence[Planner]) -> None:
+    """Raises `UsageError`, before anything is trained, if an evaluation would run in an engine that is missing."""
+    for planner in planners:
+        steps = planner.plan() if planner.loaded.recipe.eval.engine == "drake" else ()
+        if any(step.stage.name == "eval" and not step.cached for step in steps):
+            options.require_extra("drake", "eval.engine: drake")
 
 
 def compare_variants(request: Request, variants: Sequence[Run], console: Console, track: bool) -> None:
@@ -169,7 +178,10 @@ def run_recipe(
     if ending.code == DONE and runner is not None and manner != "quiet":
         print_results(request.runs, loaded.recipe.name, runner.artifacts, console)
     if tracker is not None and not delivered and backlog(request.runs):
-        console.print("MLflow has not taken everything yet; the rest is sent in the background", highlight=False)
+        console.print(
+            "MLflow has not taken everything yet; the rest is sent in the background, or by the next run",
+            highlight=False,
+        )
     if closing:
         tell(errors or Console(stderr=True), closing)
     return ending

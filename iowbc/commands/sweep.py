@@ -20,7 +20,7 @@ from iowbc.commands.printed import shown_path, stdout_console, tell
 from iowbc.commands.process import DONE, INTERRUPTED, STAGE_FAILED, RunEnding, ignoring_broken_outputs
 from iowbc.commands.request import Request, in_order, prepared
 from iowbc.commands.results import headline
-from iowbc.commands.run import requested_cluster, run_recipe
+from iowbc.commands.run import requested_cluster, require_engine, run_recipe
 from iowbc.errors import UsageError
 from iowbc.pipeline.console.board import Board
 from iowbc.pipeline.planner import Planner
@@ -110,6 +110,7 @@ def run_sweep(
     _require_origins(asked, planners)
     runs, execution = asked.runs, planners[0].loaded.recipe.execution
     options.require_extra("train", "iowbc sweep")
+    require_engine(planners)
     require_writable_runs(runs)
     folder = runs.sweeps / found.name
     before, said = planned(planners), Console(quiet=True) if quiet else console

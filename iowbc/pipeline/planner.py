@@ -60,7 +60,7 @@ class Planner:
                     timed = estimated(step, self.store.artifacts(name), made)
                     steps[name] = replace(timed, reasons=(f"{NOT_WHOLE}; {stage.name} reads it",))
         running = [stage for stage in self.stages if not steps[stage.name].cached]
-        if any([self._want_whole(stage, borrowed[stage.name]) for stage in running]):
+        if any(self._want_whole(stage, borrowed[stage.name]) for stage in running):
             known.clear()
             return self.plan(known)
         known[self] = list(steps.values())

@@ -156,27 +156,40 @@ def load_sweep(word: str, settings: Sequence[str], file: Path | None = None, mos
         for combination in itertools.product(*grid.values()):
             points += _points(word, fixed, dict(zip(grid, combination, strict=True)) | draw)
     name = described.name or _slug([file.stem] if file is not None else [Path(word).stem, *map(_leaf, axes)])
+    if common := _common(fixed):
+        name = f"{name[: LONGEST_NAME - DIGEST_LENGTH - 1]}-{_digest(common)}"
     return Sweep(name[:LONGEST_NAME], tuple(points))
+
+
+def _common(fixed: Sequence[str]) -> list[str]:
+    """The settings of all points that may decide results, and so belong to their names."""
+    return sorted(setting.strip() for setting in fixed if not setting.strip().startswith("execution."))
 
 
 def _points(word: str, fixed: Sequence[str], settings: Mapping[str, JsonValue]) -> list[Point]:
     """The point of a recipe, or the points of a study's variants."""
     overrides = (*fixed, *(f"{path}={written(value)}" for path, value in settings.items()))
     if variants := load_study(word, overrides):
-        return [Point(_named(one, settings), {RECIPE_AXIS: one.recipe.name, **settings}) for one in variants]
-    return [Point(_named(load_recipe(word, overrides), settings), settings)]
+        named = ((one.recipe.name, _named(one, settings, _common(fixed))) for one in variants)
+        return [Point(one, {RECIPE_AXIS: name, **settings}) for name, one in named]
+    return [Point(_named(load_recipe(word, overrides), settings, _common(fixed)), settings)]
 
 
-def _named(loaded: LoadedRecipe, settings: Mapping[str, JsonValue]) -> LoadedRecipe:
-    """The recipe renamed by its settings; the name is the same in every sweep that contains it."""
-    if not settings:
+def _named(loaded: LoadedRecipe, settings: Mapping[str, JsonValue], common: Sequence[str]) -> LoadedRecipe:
+    """The recipe renamed by its settings; the name is the same in every sweep that contains it. `common`: settings of
+    all points."""
+    if not settings and not common:
         return loaded
     name = _slug([loaded.recipe.name, *(f"{_leaf(path)}-{written(value)}" for path, value in settings.items())])
-    if not settings.keys() <= {"seed"} or len(name) > LONGEST_NAME:
-        digest = hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()[:DIGEST_LENGTH]
+    if common or not settings.keys() <= {"seed"} or len(name) > LONGEST_NAME:
+        digest = _digest([settings, common] if common else settings)
         name = f"{name[: LONGEST_NAME - DIGEST_LENGTH - 1]}-{digest}"
     recipe = loaded.recipe.model_copy(update={"name": name})
     return replace(loaded, recipe=recipe, overrides=(*loaded.overrides, f"name={name}"))
+
+
+def _digest(content: Any) -> str:
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:DIGEST_LENGTH]
 
 
 def _leaf(path: str) -> str:

@@ -79,7 +79,7 @@ def metrics_table(groups: Sequence[Group]) -> Table:
     rows: list[tuple[Cell, ...]] = []
     for stage, metric in ((stage, metric) for stage, metrics in names.items() for metric in metrics):
         values = [group.values(stage, metric) for group in groups]
-        if len(groups) == 1 or any(not np.array_equal(np.unique(own), np.unique(values[0])) for own in values[1:]):
+        if len(groups) == 1 or not all(_alike(own, values[0]) for own in values[1:]):
             row: list[Cell] = [stage, metric, _cell(values[0])]
             for own in values[1:]:  # a difference is empty where either is unknown
                 known = len(own) and len(values[0])
@@ -87,6 +87,12 @@ def metrics_table(groups: Sequence[Group]) -> Table:
             rows.append(tuple(row))
     others = [head for group in groups[1:] for head in (Column(group.label, role="detail"), f"Δ {group.label}")]
     return Table("metrics", "", heads("stage", "metric", groups[0].label, *others), rows, grouped=False)
+
+
+def _alike(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
+    """True for the same values in any order; of groups of different size, for the same values without repetitions."""
+    ordered = np.sort if len(one) == len(other) else np.unique
+    return np.array_equal(ordered(one), ordered(other))
 
 
 def _cell(values: NDArray[np.float64]) -> Cell:
@@ -102,7 +108,7 @@ def trainings_table(groups: Sequence[Group], missing: Sequence[str] = ()) -> Tab
     named = [STAGES[name] for name in STAGES if name in used | {"teacher", "distill"}]
     methods = {stage.name: stage.trained_by for stage in named if stage.trained_by}
     numbers = [
-        {"recipe": run.label, "algorithm": str(run.recipe["eval"]["label"]), "seed": seed}
+        {"recipe": run.label, "algorithm": _evaluated(run)["eval"]["label"], "seed": seed}
         | {stage: _steps_of(run, stage) for stage in methods}
         for group in groups
         for run, seed in zip(group.runs, group.seeds, strict=True)
@@ -112,10 +118,17 @@ def trainings_table(groups: Sequence[Group], missing: Sequence[str] = ()) -> Tab
     ]
     rows += [(name, "not evaluated yet", *[ABSENT] * (1 + len(methods))) for name in missing]
     columns = heads("Recipe", "Algorithm", "Seed", *(f"Steps of {method}" for method in methods.values()))
-    budget = "" if len({row["teacher"] for row in numbers}) == 1 else "not "
+    budgets = {row["teacher"] for row in numbers}
+    budget = "" if len(budgets) == 1 else "not "
+    budget = "" if budgets == {None} else f", {budget}all with the same budget of PPO"
     lacking = f" Missing: {', '.join(missing)}." if missing else ""
-    caption = f"What was trained, {budget}all with the same budget of PPO.{lacking}"
+    caption = f"What was trained{budget}.{lacking}"
     return Table("trainings", caption, columns, rows, pd.DataFrame(numbers))
+
+
+def _evaluated(run: Run) -> Mapping[str, Any]:
+    """The recipe of a run's evaluation, whose label its trials have; of a run without one its own."""
+    return run.artifacts["eval"].recipe if "eval" in run.artifacts else run.recipe
 
 
 def _steps_of(run: Run, stage: str) -> int | None:

@@ -38,7 +38,7 @@ class CheckedFunction:
         StageFailed if the function raises or returns anything else."""
         try:
             found = np.asarray(self.function(source), np.float64)
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise StageFailed(f"{self.where}: raised {_told(error, self.file)}; {self.contract}") from error
         if not any(_fits(found.shape, shape) for shape in shapes):
             expected = " or ".join(str(shape).replace("None", "k") for shape in shapes)

@@ -12,7 +12,7 @@ from iowbc.commands.compare import _joined, report_joint
 from iowbc.commands.lookup import film_of, points_of, start_comparison
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
-from iowbc.report.runs import Run, grouped
+from iowbc.report.runs import Group, Run, grouped, metrics_table
 
 Command = Callable[..., "subprocess.CompletedProcess[str]"]
 
@@ -89,9 +89,8 @@ def test_a_second_training_shares_the_reference_generator(folder: Path, command:
 
 def evaluated(folder: Path, name: str, label: str, error: float, seed: int | None, steps: int) -> Run:
     """A run whose trials have these errors."""
-    artifact = SimpleNamespace(
-        folder=folder / name, recipe={"eval": {"success": {"capacity_rate": 0.8}}}, metrics={}, ingredients={}
-    )
+    made = {"eval": {"label": label, "success": {"capacity_rate": 0.8}}}
+    artifact = SimpleNamespace(folder=folder / name, recipe=made, metrics={}, ingredients={})
     artifact.folder.mkdir()
     trials_of(label, "lifting", {0.0: 5, 4.0: 5}, error=error).to_parquet(artifact.folder / "trials.parquet")
     teacher = {"steps": steps} if seed is None else {"steps": steps, "seed": seed}
@@ -120,6 +119,24 @@ def test_trainings_that_differ_in_their_seeds_alone_are_one_variant(tmp_path: Pa
         "| longer | IO-WBC | 3 | 8,192 | – |",
         "| never | not evaluated yet | – | – | – |",
     ]
+
+
+def test_a_label_that_is_the_name_of_another_recipe_is_replaced(tmp_path: Path) -> None:
+    runs = [evaluated(tmp_path, name, "IO-WBC", error, None, 4096) for name, error in (("one", 0.1), ("two", 0.2))]
+    runs[1].recipe["teacher"] = {"steps": 4096, "gamma": 0.9}  # type: ignore[index]
+    named = evaluated(tmp_path, "three", "one", 0.4, None, 8192)
+    report_joint([*runs, named], tmp_path)
+    lifting = (tmp_path / "tables" / "lifting.md").read_text()
+    assert [f"| {name} | 0." in lifting for name in ("one", "two", "three")] == [True, True, True]
+
+
+def test_metrics_with_equal_values_of_other_frequency_differ() -> None:
+    def group(name: str, values: tuple[float, ...]) -> Group:
+        runs = [Run(name, {"eval": SimpleNamespace(metrics={"succeeded": value})}) for value in values]  # type: ignore[dict-item]
+        return Group(name, tuple(runs))
+
+    often, seldom, once = group("a", (20.0, 20.0, 10.0)), group("b", (10.0, 20.0, 10.0)), group("c", (20.0, 10.0))
+    assert [len(metrics_table([often, other]).rows) for other in (seldom, once, often)] == [1, 0, 0]
 
 
 def test_an_evaluation_that_two_recipes_share_counts_once(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from iowbc.errors import RecipeError
 from iowbc.pipeline.planner import Planner, planner_for
 from iowbc.pipeline.stage import START, Job, Stage
 from iowbc.pipeline.stage_plan import Options, StagePlan
+from iowbc.pipeline.store.artifact import INGREDIENTS
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
 from iowbc.recipe.reading.loading import load_recipe
@@ -179,6 +180,16 @@ def test_a_recipe_that_several_begin_from_is_planned_once(tmp_path: Path, monkey
     planner_for(experts, STAGES, Store(Runs(tmp_path)), robot_folder("g1"), Options()).plan()
     assert len(decided) > 20
     assert set(decided.values()) == {1}
+
+
+def test_gc_keeps_what_an_interrupted_training_begins_from(workplace: Workplace, second: str) -> None:
+    first = workplace.run()["teacher"]
+    assert workplace.command("run", "small.yaml").code == 0
+    attempt = workplace.store.runs.work / "0123"
+    attempt.mkdir(parents=True)
+    (attempt / INGREDIENTS).write_text(json.dumps({"inputs": {START: first.manifest.digest}}))
+    assert "runs/store/teacher" not in workplace.command("gc", "--recipe", "small", "--dry-run").output
+    assert "runs/store/teacher" in workplace.command("gc", "--recipe", "small", "--work", "--dry-run").output
 
 
 def test_gc_keeps_what_another_recipe_begins_from(workplace: Workplace, second: str) -> None:

@@ -53,6 +53,13 @@ def test_a_point_has_the_same_name_in_every_sweep_and_its_settings_can_be_typed(
     assert wide.name.startswith("small-steps-100000-seed-0-")
 
 
+def test_settings_of_all_points_belong_to_the_names(recipe: str) -> None:
+    sweeps = [load_sweep(recipe, ["seed=0,1", *more]) for more in ([], ["eval.trials=2"], ["eval.trials=3"])]
+    assert len({sweep.name for sweep in sweeps} | {point.name for one in sweeps for point in one.points}) == 9
+    silent = load_sweep(recipe, ["seed=0,1", "execution.track=false"])
+    assert (silent.name, silent.points[0].name) == ("small-seed", "small-seed-0")
+
+
 def test_two_paths_that_end_alike_give_different_names(recipe: str) -> None:
     one = load_sweep(recipe, ["teacher.learning_rate=0.001,0.002"]).points[0]
     other = load_sweep(recipe, ["distill.learning_rate=0.001,0.002"]).points[0]

@@ -184,7 +184,7 @@ def test_a_changed_contract_is_refused(folder: Path, controller: Controller) -> 
     contract = json.loads((folder / CONTRACT).read_text())
     contract["robot"]["velocity"] = [10.0 * value for value in contract["robot"]["velocity"]]
     (folder / CONTRACT).write_text(json.dumps(contract))
-    with pytest.raises(ContractBroken, match="differs from the contract with which skill.onnx was made"):
+    with pytest.raises(ContractBroken, match=r"differs from the contract with which skill\.onnx was made"):
         Skill.load(folder, controller)
 
 

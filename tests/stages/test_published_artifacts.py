@@ -109,7 +109,9 @@ def test_what_was_published_without_weights_is_played_from_an_earlier_stage_or_r
     assert playable(store, "full", None).manifest.stage == "distill"
     with pytest.raises(UsageError, match=r"without settle.onnx, step.onnx; to make it anew: .* --force export"):
         playable(store, "full", "export")
-    with pytest.raises(UsageError, match=r"teacher of compliant_pace came .* without teacher.json, teacher.safetensors"):
+    with pytest.raises(
+        UsageError, match=r"teacher of compliant_pace came .* without teacher.json, teacher.safetensors"
+    ):
         playable(store, "compliant_pace", None)
 
 
