@@ -56,10 +56,10 @@ def gc(
             "--work (unfinished stages), --damaged; --older-than DAYS narrows it, --dry-run only lists"
         )
     store, console = Store(Runs(runs)), stdout_console()
-    if store.runs.root.exists() and not dry_run:
+    total, alone = 0, store.runs.root.exists() and not dry_run
+    if alone:
         require_writable_runs(store.runs)
-    total = 0
-    with nullcontext() if dry_run else named_lock(lock_path(store.runs, "gc")):
+    with named_lock(lock_path(store.runs, "gc")) if alone else nullcontext():
         for path in dict.fromkeys(_to_remove(store, unused, recipes or (), work, damaged, older_than)):
             if older_than and time.time() - path.stat().st_mtime < older_than * DAY:
                 continue

@@ -69,8 +69,8 @@ MODEL = 5
 """`mode_machine` of the G1 with 29 joints, revision 1.0, whose masses and gears the MJCF has."""
 PITCH_ROLL = 0
 """`mode_pr` in which ankles and waist are commanded by pitch and roll, not by their motors' angles."""
-MOST_STATES = 700.0
-"""State messages a second beyond which a second robot sends some; one sends 500."""
+STATES = (400.0, 700.0)
+"""Fewest and most state messages a second: a robot sends 500; of more, some are of a second one."""
 MIXED = "states of two robots, or of one that has just restarted: time stamps go back"
 DRY_STEPS = 5
 """Policy steps of the dry run on the measured posture; their targets are not sent."""
@@ -123,13 +123,13 @@ def checks(
     charge = None if heard.battery is None else int(heard.battery["soc"])
     battery = "no rt/lf/bmsstate" if charge is None else f"{charge} %, {limits.battery:g} or more are needed"
     model, order = int(state["mode_machine"]), int(state["mode_pr"])
-    paced, wanted_pace = 400.0 < rate < MOST_STATES, f"400 to {MOST_STATES:g} are needed"
-    mixed = np.isfinite(sensors.mixed)
+    (fewest, most), mixed = STATES, np.isfinite(sensors.mixed)
+    paced = f"{rate:.0f} a second, {fewest:g} to {most:g} are needed"
     mode = f"the robot's own controller {heard.mode!r} is active: release it first" if heard.mode else "released"
     if heard.mode is None:
         mode = "the motion switcher does not answer: it is unknown whether the robot's own controller is released"
     return [
-        CheckResult("states", paced and not mixed, MIXED if mixed else f"{rate:.0f} a second, {wanted_pace}"),
+        CheckResult("states", fewest < rate < most and not mixed, MIXED if mixed else paced),
         CheckResult("model", model == MODEL, f"mode_machine is {model}, that of the exported robot {MODEL}"),
         CheckResult("ankles", order == PITCH_ROLL, f"mode_pr is {order}, {PITCH_ROLL} (pitch and roll) is needed"),
         CheckResult("mode", heard.mode == "", mode),
