@@ -324,7 +324,7 @@ def test_errors_differ_in_pairs_of_the_same_trial() -> None:
     assert (pairs["E_v_variant"] - pairs["E_v_reference"]).tolist() == pytest.approx([0.2] * 5)
     table = difference_table(trials)
     assert table is not None
-    assert table.rows[0][:4] == ("lifting", "WBC", "4", "+0.200")
+    assert table.rows[0][:4] == ("lifting", "WBC", "4/5", "+0.200")
     assert table.rows[0][-1] == "-20 % (p 1)"
     assert tuple(map(str, table.rows[1][:4])) == ("lifting", "stands still", "5", "-0.050 ± 0.196 (p 0.52)")
     assert difference_table(trials_of("IO-WBC", "lifting", {4.0: 5})) is None

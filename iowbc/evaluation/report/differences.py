@@ -3,15 +3,16 @@
 import numpy as np
 import pandas as pd
 
-from iowbc.evaluation.report.aggregate import TRAINING, WORLD, variants_of, with_trainings
+from iowbc.evaluation.report.aggregate import WORLD, variants_of
 from iowbc.evaluation.report.captions import in_common
 from iowbc.evaluation.report.columns import HEADS, IDLE, STANDS_STILL
 from iowbc.evaluation.report.statistics import mean_half_width, mean_p, sign_flip_p
 from iowbc.evaluation.trials.errors import ERRORS
 from iowbc.results.table import ABSENT, Column, Table, heads, measured
 
-PAIR = ["suite", "case", "mass", "impulse", "trial", "training"]
-"""Columns that identify a pair: trials with the same seed and commands. Trainings are paired in their order."""
+PAIR = ["suite", "case", "mass", "impulse", "trial"]
+"""Columns that identify a pair, trials with the same seed and commands: each training with each of the other variant.
+"""
 DRAWN = "drawn_"
 """Beginning of the columns with drawn quantities, which are equal in a pair if both recipes have the same world."""
 WITHOUT_EFFECT = ("object_mass_scale",)
@@ -20,12 +21,10 @@ WITHOUT_EFFECT = ("object_mass_scale",)
 
 def paired(trials: pd.DataFrame, variant: str, reference: str) -> pd.DataFrame:
     """Paired trials of two variants, with column suffixes `_variant` and `_reference`."""
-    trials = with_trainings(trials)
-    places = trials.groupby("variant")[TRAINING].transform(lambda seeds: pd.factorize(seeds)[0])
     drawn = [name for name in trials.select_dtypes("number") if name.startswith(DRAWN)]
-    trials = trials.assign(training=places)[["variant", *PAIR, "survived", "succeeded", *ERRORS, *drawn]]
+    trials = trials[["variant", *PAIR, "survived", "succeeded", *ERRORS, *drawn]]
     own, other = (trials[trials["variant"] == name].drop(columns="variant") for name in (variant, reference))
-    return own.merge(other, on=PAIR, suffixes=("_variant", "_reference"), validate="one_to_one")
+    return own.merge(other, on=PAIR, suffixes=("_variant", "_reference"))
 
 
 def drawn_apart(pairs: pd.DataFrame) -> list[str]:
@@ -62,7 +61,8 @@ def difference_table(trials: pd.DataFrame) -> Table | None:
         """Add a row of error differences; `errors` also holds the world of each."""
         found = {name: mean_difference(errors[name], errors[WORLD]) for name in ERRORS}
         cells = [measured(mean, half, "+.3f", note=f" (p {p:.2g})") for mean, half, p in found.values()]
-        rows.append((suite, variant, str(len(errors)), *cells, last))
+        count = f"{len(errors)}/{figures['pairs']}" if figures else str(len(errors))
+        rows.append((suite, variant, count, *cells, last))
         numbers.append({"suite": suite, "variant": variant, "reference": reference, **figures, "both": len(errors)})
         for name, values in found.items():
             parts = ("", "_half", "_p") if variant != STANDS_STILL else ("",)
@@ -91,11 +91,12 @@ def difference_table(trials: pd.DataFrame) -> Table | None:
         if names
     )
     caption = (
-        f"Differences to {reference} in pairs of trials with the same seed and commands, over all masses of a "
-        f"suite.{worlds} Errors where both survived, with 95 % interval and Student's p; success with an exact p. Both "
-        "treat worlds as clusters, since the masses and trainings in a world are correlated, and hold for these "
-        "trained policies: further trainings vary, too. Negative errors are better. No p is corrected for multiple "
-        f"comparisons. {IDLE} It is compared with the trials that {reference} survived. {in_common(trials)}"
+        f"Differences to {reference} in pairs of trials with the same seed and commands, each training with each, over "
+        f"all masses of a suite; pairs: those that both survived, of all.{worlds} Errors where both survived, with "
+        "95 % interval and Student's p; success with an exact p. Both treat worlds as clusters, since the masses and "
+        "trainings in a world are correlated, and hold for these trained policies: further trainings vary, too. "
+        f"Negative errors are better. No p is corrected for multiple comparisons. {IDLE} It is compared with the "
+        f"trials that {reference} survived. {in_common(trials)}"
     )
     columns = heads(
         *("Suite", "Algorithm", "Pairs"),

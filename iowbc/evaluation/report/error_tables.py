@@ -150,8 +150,8 @@ def _caption(chosen: pd.DataFrame, kind: str, with_paper: bool) -> str:
     beside = " Right: the paper's values, for its own commands, and in brackets ours divided by them."
     return (
         f"Command tracking errors under {title}: means over surviving trials with their 95 % interval. "
-        f"{conditions(chosen)} {measures(chosen)} Transport: fractions of the commanded distance that robot / object "
-        "cover; kept: fraction of the robot's part of the weight that its hands bear, or trials whose crate is not "
-        f"lost to a side; success: survived, with enough of both. {columns.IDLE}"
+        f"{conditions(chosen)} {measures(chosen)} Transport, over all trials: fractions of the commanded distance that "
+        "robot / object cover; kept: fraction of the robot's part of the weight that its hands bear, or trials whose "
+        f"crate is not lost to a side; success: survived, with enough of both. {columns.IDLE}"
         f"{failed}{aim if kind == 'stagnation' else ''}{beside if with_paper else ''}"
     )

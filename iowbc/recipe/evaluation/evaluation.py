@@ -40,7 +40,7 @@ class Success(Section):
     """Success criteria of a trial. Survival: neither a fall nor a dropped object, by `task.termination`, for the whole
     trial. Success: survival and transport of an object that the hands carry or keep; with a partner, also bounded
     force. An infeasible push instead requires survival, posture, feet that do not slide, and continued pushing. A
-    robot that stands still never succeeds."""
+    robot that stands still never succeeds where a distance is commanded."""
 
     withdrawn_from_key: ClassVar[Mapping[str, Any]] = {"slip_fails": False}
 

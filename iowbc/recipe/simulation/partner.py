@@ -87,7 +87,7 @@ class PartnerSettings(Section):
     """Compliant partner: spring, damper and preload at the far handle. Its behaviour determines its motion."""
 
     enabled: bool = True
-    """Enable the partner; if false, the robot handles the object alone."""
+    """Enable the partner in episodes that draw its share; trials with a given share have a partner all the same."""
     share: Distribution = Distribution(low=0.0, high=0.6, nominal=0.0, probability=0.7)
     """Fraction of a held object's weight that the partner bears; 0: no partner."""
     push_share: Distribution = Distribution(low=-0.3, high=0.6, nominal=0.0, probability=0.7)

@@ -50,8 +50,9 @@ class Randomization(Section):
     """Object mass relative to the nominal one: from a 0.5 kg box and a 5 kg crate, the lightest loads of the trials, to
     150 %. Table I has 50 to 150 %."""
     light_share: float = Field(default=0.0, ge=0.0, le=1.0, json_schema_extra=LATER)
-    """Fraction of the episodes with a light object, whose mass is log-uniform between the lower end of
-    `object_mass_scale` and `light_end`. A uniform range from 0.05 kg has only 4 % of its masses below 0.5 kg."""
+    """Fraction of the episodes whose object is made light, besides those that draw a light one: its mass is log-uniform
+    between the lower end of `object_mass_scale` and `light_end`. A uniform range from 0.05 kg has only 4 % of its
+    masses below 0.5 kg."""
     light_end: float = Field(default=0.1, gt=0.0, json_schema_extra=LATER)
     """Largest mass of a light object relative to the nominal one: 0.7 kg in the hands, a crate of 6.5 kg."""
     inertia_scale: Distribution = Distribution(low=0.8, high=1.2, nominal=1.0)
@@ -97,8 +98,8 @@ class Randomization(Section):
     sensor_latency: Distribution = Distribution(low=0.0, high=1.0, nominal=0.0)
     """Delay of joint and inertial measurements [control periods]."""
     slow_share: float = Field(default=0.0, ge=0.0, le=1.0, json_schema_extra=LATER)
-    """Fraction of the episodes in which action and sensor latency are both in the upper third of their ranges. Drawn
-    independently, they are so in one episode of nine; robots that tolerate either of them fall with both."""
+    """Fraction of the episodes in which action and sensor latency are both drawn from the upper third of their ranges,
+    besides one in nine of the others, by chance; robots that tolerate either of them fall with both."""
     object_latency: Distribution = Distribution(low=0.0, high=2.0, nominal=0.0)
     """Delay of the measured pose and rates of the object [control periods]."""
     longest_latency: int = Field(default=4, ge=1, le=100)

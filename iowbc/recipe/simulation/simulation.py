@@ -50,7 +50,8 @@ class Physics(Section):
     """Fraction of the no-load speed up to which a motor gives its full torque; beyond it, the torque falls linearly to
     zero. An assumption, not a measured curve."""
     cone: Literal["pyramidal", "elliptic"] = "pyramidal"
-    """Friction cone: an inscribed pyramid, or the exact elliptic cone at 10 % more computing time."""
+    """Friction cone: an inscribed pyramid with corners on the world's axes, which allows down to 0.71 of the friction
+    between them, or the exact elliptic cone at 10 % more computing time."""
     foot_time_constant: float = Field(default=0.02, gt=0.0, json_schema_extra=LATER)
     """Time constant of the contact between feet and ground [s], at least two physics steps. It is also that of a
     sliding foot's deceleration: with 10 ms and the elliptic cone feet slide half as far (docs/engines.md)."""

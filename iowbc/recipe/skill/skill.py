@@ -105,7 +105,7 @@ class RobotAgent(Section):
     `compliant_merged` pushes 80 kg at 0.63 of the pace, at 0.72 m and 0.2 rad at 0.44."""
     admittance: tuple[float, float] = (0.012, 0.008)
     """Admittance of a nominal follower: velocity per force on its hands, forward and to the left [m/(N·s)]: 30 N make
-    it walk at 0.36 m/s."""
+    it walk at 0.31 m/s with the default `deadband`."""
     deadband: float = Field(default=4.0, ge=0.0)
     """Force below which a nominal follower stands [N]; the force estimate has an error of this size."""
     push_force: float = Field(default=40.0, gt=0.0)
@@ -192,7 +192,8 @@ class Skill(Section):
     """Decision frequency [Hz]; the control frequency is an integer multiple of it."""
     tasks: Tasks = Tasks()
     goal_known: float = Field(default=0.5, ge=0.0, le=1.0)
-    """Fraction of the games in which the robot knows the path; in the others only the human does."""
+    """Fraction of the games in which the robot knows the path, besides all with a follower; in the others only the
+    human does."""
     partners: PartnerKinds = PartnerKinds()
     robot: RobotAgent = RobotAgent()
     human: HumanAgent = HumanAgent()

@@ -45,7 +45,8 @@ class Curriculum(Section):
     levels of that one, which without a curriculum stay; otherwise, as a training from random weights does, at 0, or
     without a curriculum at `fixed_level`."""
     fixed_level: float = Field(default=1.0, ge=0.0, le=2.0)
-    """Level of all axes without a curriculum, in evaluation and in single environments. 1: the recipe's own ranges."""
+    """Level of all axes without a curriculum and in single environments; trials have level 1, the recipe's own
+    ranges."""
     velocity: Scale = Scale(start=1.0, full=1.0, extreme=1.3)
     """Factor on the range of v_x at each level of locomotion; by default the full range from the start. At 0.6, a robot
     that steps in place tracks the command so closely that it hardly learns to walk."""

@@ -80,7 +80,9 @@ def _table(name: str, games: pd.DataFrame, group: "pd.Series[str]", kind: str) -
         f"Games by {kind}: success, and interquartile means over all episodes, with 95 % intervals by bootstrap over "
         "trainings and episodes. Partner force: 90th percentile of the horizontal force of the human within an "
         "episode; worst partner: the greatest such mean of one partner. P: probability that the first skill has the "
-        "smaller partner force in the same episode. Every skill plays the same episodes, in simulation."
+        "smaller partner force in the same episode. Partner work: integral of the absolute power of the human beyond "
+        "its share. Tilt: largest of an episode; load share: that of the robot. Every skill plays the same "
+        "episodes, in simulation."
     )
     return Table(name, caption, columns, rows, pd.DataFrame(numbers))
 
