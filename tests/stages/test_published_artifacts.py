@@ -13,13 +13,14 @@ from typer.testing import CliRunner
 from iowbc.cli import app
 from iowbc.commands.lookup import named
 from iowbc.commands.playable import playable, skill_to_play
+from iowbc.commands.publish import LARGEST_REPOSITORY
 from iowbc.control.sensors import Measured
 from iowbc.deploy.controller import Controller
 from iowbc.errors import UsageError
 from iowbc.evaluation.report.aggregate import aggregate
 from iowbc.pipeline.store.runs import Runs, read_yaml
 from iowbc.pipeline.store.store import Store
-from iowbc.recipe.recipe import Recipe
+from iowbc.recipe.recipe import PIPELINE, Recipe
 from iowbc.report.runs import grouped
 
 ROOT = Path(__file__).parents[2]
@@ -67,6 +68,17 @@ def test_a_fresh_clone_finds_the_stages_of_a_recipe_published(recipe: str, last:
     states = {stage["stage"]: stage["cached"] and stage["published"] for stage in plan["stages"]}
     assert all(states.values()), (states, plan["stages"])
     assert last in states
+
+
+def test_every_published_artifact_is_sound_and_all_are_small() -> None:
+    store = Store(Runs(ROOT / "runs"))
+    for stage in PIPELINE:
+        found = store.published(stage)
+        assert len(found) == len(list((ROOT / "runs" / "published").glob(f"{stage}/*")))
+        for artifact in found:
+            artifact.verify()
+    files = [path for path in store.runs.published.rglob("*") if path.is_file()]
+    assert sum(path.stat().st_size for path in files) <= LARGEST_REPOSITORY
 
 
 def test_this_version_reads_the_recipe_of_each_published_artifact() -> None:
