@@ -21,6 +21,7 @@ from iowbc.deploy.contract import Contract, read_contract, readable, require_sea
 from iowbc.deploy.exported_folder import CONTRACT, ROBOT, SETTLE, STEP, exported_folder
 from iowbc.deploy.plausibility import WIDE, Limits, Plausibility, TargetGuard
 from iowbc.errors import ContractBroken
+from iowbc.recipe.section import Section
 from iowbc.recipe.task.joint_references import Grasps
 from iowbc.robot.description import Robot, load_robot
 
@@ -35,6 +36,13 @@ def open_session(path: Path) -> onnxruntime.InferenceSession:
     options.intra_op_num_threads = options.inter_op_num_threads = 1
     options.enable_mem_reuse = False  # its planner takes seconds for the iterations of `settle` and saves 10 MB
     return onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
+
+
+def require_traced(session: onnxruntime.InferenceSession, contract: Section, path: Path, graph: str) -> None:
+    """Raises ContractBroken if the contract at `path` is not the one in the metadata of the graph of that name."""
+    traced = session.get_modelmeta().custom_metadata_map.get("contract", "{}")
+    if type(contract).model_validate_json(traced) != contract.model_copy(update={"files": {}}):
+        raise ContractBroken(f"{path}: differs from the contract with which {graph} was made; export again")
 
 
 def run(session: onnxruntime.InferenceSession, inputs: Values) -> Values:
@@ -125,11 +133,7 @@ class Controller:
             if found != (said := {port.name: port.shape for port in ports}):
                 raise ContractBroken(f"{folder / name}: inputs are {found}, the contract says {said}; export again")
             sessions.append(session)
-            traced = session.get_modelmeta().custom_metadata_map.get("contract", "{}")
-            if Contract.model_validate_json(traced) != contract.model_copy(update={"files": {}}):
-                raise ContractBroken(
-                    f"{folder / CONTRACT}: differs from the contract with which {name} was made; export again"
-                )
+            require_traced(session, contract, folder / CONTRACT, name)
         controller = cls(contract, robot, sessions[0], sessions[1], robots, limits)
         state = {"state": next(port for port in contract.inputs if port.name == "state").shape}
         with readable(folder / SETTLE):

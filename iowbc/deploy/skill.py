@@ -22,7 +22,7 @@ from iowbc.control.sensors import Measured
 from iowbc.control.skill_command import SkillCommand
 from iowbc.control.skill_observation import SENSED, WAYPOINTS, YAW, of_object, robot_observation
 from iowbc.deploy.contract import parsed, readable, require_sealed, require_unchanged
-from iowbc.deploy.controller import Controller, base_grasp, open_session, run
+from iowbc.deploy.controller import Controller, base_grasp, open_session, require_traced, run
 from iowbc.deploy.plausibility import WIDE, Plausibility
 from iowbc.errors import ContractBroken
 from iowbc.recipe.section import Section
@@ -108,10 +108,7 @@ class Skill:
             raise ContractBroken(f"{folder}: {contract.frequency} Hz is no whole part of {controller.frequency} Hz")
         with readable(folder / GRAPH):
             session = open_session(folder / GRAPH)
-            traced = session.get_modelmeta().custom_metadata_map.get("contract", "{}")
-            if SkillContract.model_validate_json(traced) != contract.model_copy(update={"files": {}}):
-                text = f"differs from the contract with which {GRAPH} was made; export again"
-                raise ContractBroken(f"{folder / CONTRACT}: {text}")
+            require_traced(session, contract, folder / CONTRACT, GRAPH)
             sizes = [tuple(port.shape[1:]) for port in (*session.get_inputs(), *session.get_outputs())]
         if sizes != [(contract.observation,), (len(nominal_command(contract.commands)),)]:
             raise ContractBroken(f"{folder / GRAPH}: shapes are {sizes}, not those of the contract; export again")

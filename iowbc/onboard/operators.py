@@ -171,6 +171,11 @@ class Datagram(Section):
     seen: dict[str, tuple[float, ...]] = Field(default_factory=dict)
     """Measurements of the object by the names of the contract's inputs."""
 
+    @property
+    def commands(self) -> bool:
+        """False for measurements of the object alone."""
+        return self.model_fields_set != {"seen"}
+
 
 class Udp:
     """JSON datagrams at a local port; see `Datagram`. Of datagrams that cannot be parsed only a request to damp counts;
@@ -201,11 +206,10 @@ class Udp:
                         request = State.DAMPING  # whatever else is wrong
                     given = Datagram.model_validate(content)
                     self._wanted = self._given(given, now)
-                    if given.model_fields_set == {"seen"}:
-                        continue
-                    if request is not State.DAMPING and given.request is not self._requested:
-                        request = given.request or request
-                    self._requested = given.request
+                    if given.commands:
+                        if request is not State.DAMPING and given.request is not self._requested:
+                            request = given.request or request
+                        self._requested = given.request
         return replace(self._wanted, request=request)
 
     def discard(self) -> None:
@@ -227,7 +231,7 @@ class Udp:
         known = self.ranges.seen.items() & sizes.items()  # a measurement of another size is ignored
         seen: dict[str, Any] = {name: np.array([given.seen[name]]) for name, _ in known}
         seen_at = now if seen else self._wanted.seen_at
-        if given.model_fields_set == {"seen"}:  # a pose is no command
+        if not given.commands:
             return replace(self._wanted, seen=seen or self._wanted.seen, seen_at=seen_at)
         return OperatorRequest(command, now, None, seen or self._wanted.seen, seen_at)
 

@@ -119,8 +119,7 @@ def trainings_table(groups: Sequence[Group], missing: Sequence[str] = ()) -> Tab
     rows += [(name, "not evaluated yet", *[ABSENT] * (1 + len(methods))) for name in missing]
     columns = heads("Recipe", "Algorithm", "Seed", *(f"Steps of {method}" for method in methods.values()))
     budgets = {row["teacher"] for row in numbers}
-    budget = "" if len(budgets) == 1 else "not "
-    budget = "" if budgets == {None} else f", {budget}all with the same budget of PPO"
+    budget = "" if budgets == {None} else f", {'' if len(budgets) == 1 else 'not '}all with the same budget of PPO"
     lacking = f" Missing: {', '.join(missing)}." if missing else ""
     caption = f"What was trained{budget}.{lacking}"
     return Table("trainings", caption, columns, rows, pd.DataFrame(numbers))
