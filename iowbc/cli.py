@@ -45,7 +45,6 @@ BENCHMARKS = {
     "train": "Measure the teacher's training speed against plain stable-baselines3; results go to MLflow.",
     "control": "Measure the control step's time of an exported controller on one thread, without torch or a simulator.",
     "carry": "Evaluate a public controller on a fixed suite of lifts and pushes, and write a page of results.",
-    "engines": "Compare MuJoCo and Drake in experiments where they must agree; needs the extra `drake`.",
 }
 """The same of `iowbc bench`."""
 MODULES = {"status": "listing", "ls": "listing", "show": "listing", "report": "compare", "robot-sim": "robot"}

@@ -1,4 +1,4 @@
-"""`iowbc bench`: benchmarks of this machine and of two physics engines, and of others' controllers on a fixed suite."""
+"""`iowbc bench`: benchmarks of this machine, and of others' controllers on a fixed suite."""
 
 import json
 import tempfile
@@ -10,7 +10,7 @@ import numpy as np
 from typer import Argument, Option
 
 from iowbc.commands import options
-from iowbc.errors import IowbcError, UsageError, require_known
+from iowbc.errors import UsageError, require_known
 from iowbc.files import data_digest, file_digest
 from iowbc.pipeline.store.runs import Runs, require_writable, require_writable_runs
 from iowbc.pipeline.tracking.tracker import record_figures
@@ -85,16 +85,6 @@ def control(
     for name, taken in zip(("time", "processor time"), 1e3 * step_seconds(what, steps, skill).T, strict=True):
         median, late, longest = (f"{value:.3f} ms" for value in np.quantile(taken, (0.5, 0.99, 1.0)))
         print(f"{name:16}{median:>12}{late:>18}{longest:>12}")
-
-
-def engines(robot: Annotated[str, Argument(help="Robot, by name or folder.", metavar="ROBOT")] = "g1") -> None:
-    """Compare MuJoCo and Drake. Raises `UsageError`, and `IowbcError` where they differ."""
-    options.require_extra("train", "iowbc bench")
-    from iowbc.benchmarks import engines
-
-    differing = [row.name for row in engines.main(robot_folder(robot)) if not row.agrees]
-    if differing:
-        raise IowbcError(f"the engines differ by more than expected: {', '.join(differing)}")
 
 
 def _checked(runs: Path, file: Path | None, scene: str) -> Recipe:

@@ -5,6 +5,7 @@ import sys
 import numpy as np
 import pytest
 from changes import changed
+from engine_agreement import arm_pendulum, crate_threshold, free_fall, static_load, step_responses, swinging_box
 from stepping import run
 
 from iowbc.errors import UsageError
@@ -14,7 +15,7 @@ from iowbc.recipe.section import deciding
 from iowbc.recipe.simulation.simulation import SimulationSettings as Recipe
 from iowbc.sim.simulation import Simulation
 
-EXPERIMENTS = ("free_fall", "arm_pendulum", "step_responses", "static_load", "crate_threshold", "swinging_box")
+EXPERIMENTS = (free_fall, arm_pendulum, step_responses, static_load, crate_threshold, swinging_box)
 SCENES = ["lift", "free", "push", "tyre", "squeeze"]
 
 
@@ -34,12 +35,13 @@ def drake(robot, carrying):
     return make
 
 
-@pytest.mark.parametrize("experiment", EXPERIMENTS)
+@pytest.mark.parametrize("experiment", EXPERIMENTS, ids=lambda experiment: experiment.__name__)
 def test_the_engines_agree_where_they_must(robot, experiment):
     pytest.importorskip("pydrake")
-    from iowbc.benchmarks import engines
-
-    rows = getattr(engines, experiment)(robot)
+    rows = experiment(robot)
+    for row in rows:
+        law = "" if np.isnan(row.law) else f", law {row.law:.4g}"
+        print(f"{row.name} [{row.unit}]: MuJoCo {row.engines[0]:.4g}, Drake {row.engines[1]:.4g}{law}")
     assert all(np.isfinite(row.tolerance) for row in rows)
     assert [row for row in rows if not row.agrees] == []
 

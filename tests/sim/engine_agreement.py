@@ -1,15 +1,14 @@
-"""`iowbc bench engines`: experiments in which MuJoCo and Drake must agree with each other and with theory."""
+"""Experiments in which MuJoCo and Drake must agree with each other and with theory."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from iowbc.arrays import Array
 from iowbc.recipe.evaluation.evaluation import Drake
 from iowbc.recipe.simulation.simulation import SimulationSettings as Recipe
-from iowbc.robot.description import GRAVITY, Robot, load_robot
+from iowbc.robot.description import GRAVITY, Robot
 from iowbc.sim.objects import measured
 from iowbc.sim.simulation import Simulation
 from iowbc.sim.state import SimulationState
@@ -44,20 +43,6 @@ class Agreement:
     @property
     def agrees(self) -> bool:
         return bool(abs(self.engines[0] - self.engines[1]) <= self.tolerance)
-
-
-def main(folder: Path) -> list[Agreement]:
-    """Runs every experiment with the robot in a folder, prints the table and returns it. Raises UsageError without
-    Drake."""
-    robot = load_robot(folder)
-    print(f"{'':62}{'MuJoCo':>10}{'Drake':>10}{'law':>10}")
-    rows = []
-    for experiment in (free_fall, arm_pendulum, step_responses, static_load, crate_threshold, swinging_box):
-        for row in experiment(robot):
-            law = "" if np.isnan(row.law) else f"{row.law:.4g}"
-            print(f"{f'{row.name} [{row.unit}]':62}{row.engines[0]:10.4g}{row.engines[1]:10.4g}{law:>10}")
-            rows.append(row)
-    return rows
 
 
 def free_fall(robot: Robot) -> list[Agreement]:
