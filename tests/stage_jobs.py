@@ -18,7 +18,6 @@ class Heard:
 
     rows: list[tuple[int, dict[str, float]]] = field(default_factory=list)
     lines: list[str] = field(default_factory=list)
-    shown: list[list[str]] = field(default_factory=list)
 
     def metrics(self, values: Mapping[str, float], step: int) -> None:
         assert all(isinstance(value, float) and math.isfinite(value) for value in values.values()), values
@@ -29,9 +28,6 @@ class Heard:
 
     def say(self, text: str) -> None:
         self.lines.append(text)
-
-    def files(self, path: Path) -> None:
-        self.shown.append(sorted(found.name for found in path.iterdir()))
 
 
 class Backwards:

@@ -15,10 +15,8 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from iowbc.arrays import Array
-from iowbc.errors import NoRenderer
 from iowbc.evaluation.report.aggregate import case_names
 from iowbc.evaluation.trials.metrics import replayed
-from iowbc.evaluation.trials.plan import Trial
 from iowbc.evaluation.trials.rollout import Outcome, in_batch, play_in, playing
 from iowbc.learning.acting import Policy
 from iowbc.recipe.evaluation.evaluation import Video
@@ -35,8 +33,6 @@ LINES_PER_FRAME = 26
 """Frame height divided by text height."""
 UNSEEN = ("robustness", "pushes", "impedance", "map")
 """Kinds of trials that are not filmed, since they look like others."""
-SMALL = Video(width=480, height=368, fps=10)
-"""Video settings during training: 10 s take about 15 s to render without a graphics card, and 0.4 MB."""
 TRIAL = ["suite", "case", "mass", "impulse", "trial"]
 """Columns that identify a trial of a variant."""
 NOT_WORD = str.maketrans({" ": "_", "/": "_"})
@@ -154,34 +150,6 @@ def film_trial(
     title = f"{row['variant']}: {row['case']}, {row['mass']:g} kg, trial {row['trial']}"
     with playing(world, [replayed(row)]) as environment:
         film_episode(environment, in_batch(policy, row), add, video, title, interrupted, progress)
-
-
-class TrainingFilms:
-    """Videos of one trial at regular intervals of a training. Existing videos are kept."""
-
-    def __init__(self, world: Specification, trial: Trial, folder: Path, parts: int) -> None:
-        """`parts`: number of equal parts of the training; a video is due after each."""
-        self.world, self.trial, self.folder, self.parts = world, trial, folder, parts
-
-    def due(self, steps: int, planned: int) -> Path | None:
-        """Path of the newest video due after `steps` of the planned steps, or None if it exists or none is due."""
-        part = min(steps, planned) * self.parts // planned
-        if not part:
-            return None
-        path = self.folder / f"{part * planned // self.parts:010}_steps.mp4"
-        return None if path.exists() else path
-
-    def make(self, path: Path, policy: Policy, say: Callable[[str], None]) -> bool:
-        """Film the trial; returns True on success. If rendering is not possible, reports it and disables videos."""
-        title = f"{self.trial.case}, {self.trial.mass:g} kg, after {int(path.name.partition('_')[0]):,} steps"
-        try:
-            with playing(self.world, [self.trial.episode]) as environment, written_film(path, SMALL.fps) as add:
-                film_episode(environment, policy, add, SMALL, title)
-        except NoRenderer as reason:
-            say(f"no films: {reason}")
-            self.parts = 0
-            return False
-        return True
 
 
 @dataclass(frozen=True)

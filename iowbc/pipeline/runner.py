@@ -5,7 +5,6 @@ import time
 import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from socket import gethostname
 
 from iowbc.errors import Damaged, Interrupted, IowbcError, PipelineFailed
@@ -49,10 +48,6 @@ class StageReport:
         self.view.progress(done, total, note)
         self.workspace.progress(done, total, note)
         self.display.moved(self.view)
-
-    def files(self, path: Path) -> None:
-        if self.tracker is not None:
-            self.tracker.files(self.view.name, [path])
 
     def say(self, text: str) -> None:
         prefix = f"{self.view.name}: "

@@ -29,9 +29,6 @@ class Report(Protocol):
     def say(self, text: str) -> None:
         """Print one line."""
 
-    def files(self, path: Path) -> None:
-        """Let tracking have a file or folder of the stage while it runs; it may be reported again."""
-
 
 @dataclass(frozen=True)
 class Job:

@@ -25,6 +25,8 @@ IO_WBC_UNLOADED = (0.125, 0.015, 0.046, 0.134)
 class Check(Section):
     """Validation during training: a fixed set of trials with the policy's mean action, at regular intervals."""
 
+    withdrawn: ClassVar[Mapping[str, Any]] = {"films": 0}
+
     every: int | None = Field(default=50, ge=1)
     """Updates between two checks; a check takes about as long as one update. Empty: no checks; the stage keeps the last
     policy, even if training has collapsed."""
@@ -39,9 +41,6 @@ class Check(Section):
     seed: int = Field(default=5000, ge=0, lt=2**32)
     """Seed of the first trial; distinct from those of training and export. Reported results have another
     `eval.split`."""
-    films: int = Field(default=0, ge=0, le=100, json_schema_extra=COSMETIC)
-    """Number of videos of a trial with medium load, evenly spaced over the training; each takes some 15 s without a
-    GPU. 0: none."""
     sequence: tuple[Segment, ...] = STAND_WALK_TURN
     """Command sequence of a trial; empty: `scripts`, or else the fixed sequences of lifting and pushing."""
     scripts: DrawnScripts | None = Field(default=None, json_schema_extra=LATER)

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, closing
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,14 +13,11 @@ from iowbc.stages.inputs import generator_stage, not_privileged
 from iowbc.stages.training import STATE, leave_extendable, rolls_elsewhere, train
 
 if TYPE_CHECKING:
-    from iowbc.evaluation.films import TrainingFilms
     from iowbc.evaluation.trials.quick import QuickEvaluation
     from iowbc.learning.teacher import TeacherTraining
     from iowbc.task.specification import Specification
     from iowbc.task.vector.vector_env import VectorEnv
 
-VIDEOS = "videos"
-"""Folder of the films made while training."""
 PANELS = (
     *("episode_seconds", "terminations/fallen", "terminations/dropped", "reward", "curriculum_level"),
     *(f"check/{name}" for name in ("score", "survived", "E_v", "transport")),
@@ -52,7 +48,6 @@ def run(job: Job) -> None:
     import torch
 
     from iowbc.control.action import action_mirror
-    from iowbc.evaluation.films import TrainingFilms
     from iowbc.learning.computing import prepare_process
     from iowbc.learning.environments import HistoryEnvironments
     from iowbc.learning.ppo import Learner
@@ -73,10 +68,10 @@ def run(job: Job) -> None:
     with ExitStack() as open_ones:
         environments = training_environments(job, count=settings.environments, seed=seed, group=settings.group)
         open_ones.enter_context(closing(environments))
-        score, films = None, None
+        score = None
         if settings.check.every is not None:
             check = open_ones.enter_context(closing(check_of(world, job.workers)))
-            score, films = check.play, TrainingFilms(check.world, check.middle, job.work / VIDEOS, settings.check.films)
+            score = check.play
         rows = environments
         if settings.history is not None:
             rows = HistoryEnvironments(environments, environments.layout.state.size, settings.history.length)
@@ -92,8 +87,7 @@ def run(job: Job) -> None:
         training = TeacherTraining(learner, score, job.report.say)
         if START in job.inputs:
             _begin(training, environments, job.inputs[START])
-        look = None if films is None else partial(_film, job, training, films)
-        curves = train(job, training, settings.checkpoint_every, _note, look)
+        curves = train(job, training, settings.checkpoint_every, _note)
         leave_extendable(job, training)
         training.keep_best()
         about = {"layout": environments.layout.describe(), "curriculum": environments.curriculum()}
@@ -101,8 +95,6 @@ def run(job: Job) -> None:
     network, architecture = training.network()
     save_network(network, architecture, job.out, "teacher", about)
     training.model.save_for_sb3(job.out / "teacher_sb3.zip")
-    if (job.work / VIDEOS).is_dir():
-        (job.work / VIDEOS).rename(job.out / VIDEOS)
     terms = sorted({name for row in curves.rows for name in row if name.startswith(("level/", "falls/", "reward/"))})
     figures = curves.write_artifact(job.out, f"{recipe.name}: teacher", PANELS, terms)
     kept = {"best_score": training.best.score} if settings.check.every is not None else {}
@@ -140,15 +132,6 @@ def check_of(world: "Specification", workers: int) -> "QuickEvaluation":
     ]
     trials = trials or quick_trials(own, "lift", (0.0,), check.trials, check.seed)
     return QuickEvaluation(own, trials, check, workers=min(workers, len(trials)))
-
-
-def _film(job: Job, training: "TeacherTraining", films: "TrainingFilms") -> None:
-    """Makes the film that is due after an update, if there is one, and shows it."""
-    from iowbc.learning.acting import policy_of
-
-    path = films.due(training.steps, training.planned)
-    if path is not None and films.make(path, policy_of(training.network()[0]), job.report.say):
-        job.report.files(path.parent)
 
 
 def _note(values: Mapping[str, float]) -> str:

@@ -33,11 +33,10 @@ def train(
     training: "Training",
     checkpoint_every: int,
     note: Callable[[Mapping[str, float]], str],
-    look: Callable[[], None] | None = None,
 ) -> "Curves":
     """Train from the job's checkpoint, from its predecessor's end, or from scratch; returns the curves.
-    `checkpoint_every`: in updates; `note`: text of an update's metrics; `look`: called after each update. Raises
-    Interrupted, with a checkpoint, once a stop is requested, and StageFailed if the state is of another version."""
+    `checkpoint_every`: in updates; `note`: text of an update's metrics. Raises Interrupted, with a checkpoint,
+    once a stop is requested, and StageFailed if the state is of another version."""
     from safetensors.numpy import load_file
 
     from iowbc.learning.checkpoint import load_checkpoint, save_checkpoint
@@ -71,8 +70,6 @@ def train(
             save_checkpoint(path, job.key, training.arrays())
         if stop:
             raise Interrupted(f"stopped at {training.steps:,} of {training.planned:,} steps, checkpoint written")
-        if look is not None:
-            look()
     return curves
 
 

@@ -9,7 +9,7 @@ from iowbc.task.curriculum import AXES
 from iowbc.task.rewards.table import TRACKED
 
 PER_EPISODE_FIELDS = (
-    *("action", "earlier_action", "filtered_velocity", "excess_force", "lag", "tracking"),
+    *("action", "earlier_action", "filtered_velocity", "excess_force", "tracking"),
     *("walked", "commanded", "covered", "heading_error", "total"),
 )
 """Fields that are zero at the start of an episode."""
@@ -79,8 +79,6 @@ class EpisodeState:
         """Heading at the start plus the integrated commanded yaw rate, (n,) [rad]."""
         self.object_place = np.zeros((n, 3))
         """Offset of a held object from the middle of the wrist targets at the start, heading frame, (n, 3) [m]."""
-        self.lag = np.zeros(n)
-        """Leaky integral of the speed lacking along the command, of robot and object, (n,) [m]."""
         self.undisturbed = np.zeros(n, np.int64)
         """Control steps since an impulse or a push last acted, (n,)."""
         self.tracking = np.zeros((n, len(TRACKED)))

@@ -152,8 +152,6 @@ class Judge:
         memory.commanded += speed * period
         memory.covered += along * period
         memory.heading_error += np.abs(error)
-        forgotten = memory.lag * (1.0 - period / self._task.termination.lag_time) + (speed - along) * period
-        memory.lag[:] = np.where(speed > 0.0, np.maximum(forgotten, 0.0), 0.0)
         memory.undisturbed[:] = np.where(disturbed, 0, memory.undisturbed + 1)
 
     def _ending(
@@ -165,7 +163,7 @@ class Judge:
         return Ending(
             fallen=fallen(moved, memory.command[:, PITCH], termination) & ~diverged,
             dropped=(dropped(moved, place, self._holding, state.grasped, termination) | left) & ~diverged,
-            lagging=lagging(memory.lag, error, followable, termination) & ~diverged,
+            lagging=lagging(error, followable, termination) & ~diverged,
             time_limit=memory.steps >= memory.limit,
             diverged=diverged,
         )
@@ -181,14 +179,10 @@ def fallen(motion: Motion, pitch_command: Array, termination: Termination) -> Ma
     )
 
 
-def lagging(lag: Array, heading_error: Array, followable: Mask, termination: Termination) -> Mask:
-    """Too far behind the command, (n,): lag (n,) [m], heading error (n,) [rad], where the command can be followed."""
-    late = np.zeros(len(lag), np.bool_)
-    if termination.lag is not None:
-        late |= lag > termination.lag
-    if termination.heading_error is not None:
-        late |= np.abs(heading_error) > termination.heading_error
-    return late & followable
+def lagging(heading_error: Array, followable: Mask, termination: Termination) -> Mask:
+    """Too far from the commanded heading, (n,): heading error (n,) [rad], where the command can be followed."""
+    limit = np.inf if termination.heading_error is None else termination.heading_error
+    return (np.abs(heading_error) > limit) & followable
 
 
 def dropped(motion: Motion, place: Array, held: Mask, grasped: Mask, termination: Termination) -> Mask:

@@ -47,7 +47,6 @@ COSMETIC = {
     "stages",
     "robot",
     "execution",
-    "teacher.check.films",
     "teacher.start",
     "teacher.history.student",
     "distill.experts",

@@ -214,17 +214,6 @@ def test_a_graphics_card_that_is_not_there_is_named(tmp_path: Path) -> None:
         teacher.run(make_job(tmp_path, recipe, workers=0))
 
 
-def test_a_training_is_filmed_at_its_parts_and_learns_the_same(trained: Path, tmp_path: Path) -> None:
-    check = small_recipe().teacher.check.model_copy(update={"films": 2})
-    job = make_job(tmp_path, small_recipe(check=check), workers=0)
-    teacher.STAGE.run(job)
-    half, end = (f"{steps:010}_steps.mp4" for steps in (64, 128))
-    assert job.report.shown == [[half], [half, end]]  # type: ignore[attr-defined]
-    assert sorted(path.name for path in (job.out / "videos").iterdir()) == [half, end]
-    for name in teacher.STAGE.results:
-        assert (job.out / name).read_bytes() == (trained / "teacher" / "out" / name).read_bytes(), name
-
-
 def test_a_check_without_a_sequence_plays_those_of_the_evaluation() -> None:
     check = {"every": 2, "trials": 2, "lifting": [4], "pushing": [30], "sequence": []}
     recipe = Recipe.model_validate(

@@ -13,7 +13,7 @@ from iowbc.task.judge import dropped, fallen, lagging, lost
 from iowbc.task.vector.vector_env import VectorEnv
 
 Make = Callable[..., VectorEnv]
-RECIPE = Termination(lag=0.5)
+RECIPE = Termination()
 
 
 def moved(**values: float) -> Any:
@@ -64,16 +64,14 @@ def test_a_crate_beside_the_hands_is_lost_where_the_recipe_says_so() -> None:
 
 
 def test_lagging_ends_an_episode_only_where_the_command_can_be_followed() -> None:
-    lag, error = np.array([0.6, 0.4, 0.0, 0.6]), np.array([0.0, 0.0, -1.3, 0.0])
-    followable = np.array([True, True, True, False])
-    assert lagging(lag, error, followable, RECIPE).tolist() == [True, False, True, False]
-    off = Termination(lag=None, heading_error=None)
-    assert not lagging(lag, error, followable, off).any()
+    error, followable = np.array([-1.3, 1.1, 1.3, 1.3]), np.array([True, True, True, False])
+    assert lagging(error, followable, RECIPE).tolist() == [True, False, True, False]
+    assert not lagging(error, followable, Termination(heading_error=None)).any()
 
 
-def test_a_robot_that_stays_where_it_is_to_walk_ends_its_episode_by_lagging(make: Make) -> None:
+def test_a_robot_that_does_not_turn_ends_its_episode_by_lagging(make: Make) -> None:
     changes = {"task.scenes.lift": 0.0, "task.commands.standing_episodes": 0.0, "task.commands.standing_share": 0.0}
-    env = make(changes=QUIET | changes | {"task.episode_duration": (9.0, 9.0), "task.termination.lag": 0.01})
+    env = make(changes=QUIET | changes | {"task.episode_duration": (9.0, 9.0), "task.termination.heading_error": 0.01})
     env.reset()
     for _ in range(40):
         _, _, done, infos = env.step(np.zeros((4, 15), np.float32))

@@ -43,11 +43,6 @@ class QuickEvaluation:
         episodes = [trial.episode for trial in trials]
         self._environment = VectorEnv(world, num_envs=len(episodes), workers=workers, seed=0, episodes=episodes)
 
-    @property
-    def middle(self) -> Trial:
-        """The trial in the middle of the list, which has a medium load."""
-        return self.trials[(len(self.trials) - 1) // 2]
-
     def play(self, policy: Policy) -> dict[str, float]:
         """Means over all trials, see `figures`, and over those of each load: `push_30_kg/survived`, `…/E_v`."""
         outcomes = zip(self.trials, play_in(self._environment, policy), strict=True)

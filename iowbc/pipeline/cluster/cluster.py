@@ -132,7 +132,5 @@ def _pass_on(job: Job, event: Event) -> None:
     kind, *rest = event
     if kind == "files":
         write_files(job.work, rest[0])
-    elif kind == "shown":
-        job.report.files(job.work / rest[0])
     else:
         getattr(job.report, kind)(*rest)

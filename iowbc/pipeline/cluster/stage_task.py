@@ -128,11 +128,6 @@ class NodeReport:
     def say(self, text: str) -> None:
         self._add("say", text)
 
-    def files(self, path: Path) -> None:
-        """Show a file or folder of the scratch in tracking; the driver has it before it hears of it."""
-        self.gather()
-        self._add("shown", path.relative_to(self._work).as_posix())
-
     def stopping(self) -> bool:
         """True once the driver wants the stage to stop after a checkpoint."""
         self._flush_when_due()

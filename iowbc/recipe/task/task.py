@@ -1,6 +1,7 @@
 """The Markov decision process: action, observation, termination, and the sections in the other files."""
 
-from typing import Annotated, Literal, Self
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field
 
@@ -46,6 +47,8 @@ class Observation(Section):
 class Termination(Section):
     """Conditions of early termination, and of a fall or a drop in evaluation."""
 
+    withdrawn_from_key: ClassVar[Mapping[str, Any]] = {"lag": None, "lag_time": 3.0}
+
     pelvis_height: float = Field(default=0.3, ge=0.0)
     """Height of the pelvis below which the robot has fallen [m]."""
     pelvis_tilt: float = Field(default=1.3, gt=0.0)
@@ -54,17 +57,9 @@ class Termination(Section):
     """Tilt of the torso to a side, at any pitch, beyond which the robot has fallen [rad]."""
     torso_pitch_error: float = Field(default=0.9, gt=0.0)
     """Torso pitch error beyond which the robot has fallen [rad]."""
-    lag: float | None = Field(default=None, gt=0.0)
-    """Lag of robot and object behind the command that ends an episode [m]; it decays with the time constant `lag_time`.
-    Empty: no limit. The end costs as much as a fall, so that standing is no safe response to a walking command. The lag
-    cannot be observed by the policy; with 0.5 m walking was learnt later. It applies only if the command is feasible:
-    not in a push, above level 1 of locomotion, or in trials."""
-    lag_time: float = Field(default=3.0, gt=0.0)
-    """Time constant of the lag's decay [s]. At 0.4 m/s a robot may stand for 1.6 s, and three fifths of the commanded
-    speed are always sufficient."""
     heading_error: float | None = Field(default=1.2, gt=0.0)
-    """Heading error against the integrated command that ends an episode [rad]; conditions as for `lag`. Empty: no
-    limit."""
+    """Heading error against the integrated command that ends an episode [rad]; it costs as much as a fall. Empty:
+    no limit. It applies only if the command is feasible: not in a push, above level 1 of locomotion, or in trials."""
     object_distance: float = Field(default=0.35, gt=0.0)
     """Distance of a held object from its place in the grasp beyond which it counts as dropped [m]."""
     object_beside: float | None = Field(default=None, gt=0.0, json_schema_extra=LATER)
