@@ -90,9 +90,9 @@ class Video(Section):
 
     count: int = Field(default=2, ge=0, le=1000)
     """Number of videos, spread over the sweeps' masses; 0 for none."""
-    width: int = Field(default=640, ge=64, le=3840, multiple_of=16)
+    width: int = Field(default=640, ge=64, le=1920, multiple_of=16)
     """Width of a frame [pixel]; video codecs require multiples of 16."""
-    height: int = Field(default=480, ge=64, le=2160, multiple_of=16)
+    height: int = Field(default=480, ge=64, le=1088, multiple_of=16)
     """Height of a frame [pixel]."""
     fps: int = Field(default=20, ge=1, le=50)
     """Frames per second; rendering a frame takes 0.1 to 0.2 s without a GPU."""

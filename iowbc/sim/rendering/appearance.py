@@ -18,7 +18,7 @@ LIGHT_PARTS = (0.80, 0.81, 0.83, 1.0)
 DARK_PARTS = (0.16, 0.17, 0.19, 1.0)
 DARK_LINKS = ("ankle", "hip_pitch", "hip_roll", "waist", "shoulder_pitch", "wrist", "hand", "head", "logo", "contour")
 """Links of the robot that are dark, by part of their name."""
-LARGEST_FRAME = (1920, 1080)
+LARGEST_FRAME = (1920, 1088)
 
 
 @dataclass(frozen=True)
