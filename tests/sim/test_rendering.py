@@ -132,5 +132,5 @@ def test_without_libraries_the_error_names_the_package(monkeypatch):
 
 
 def test_a_picture_larger_than_the_buffer_is_refused(start):
-    with pytest.raises(ValueError, match="larger than 1920 x 1080"):
+    with pytest.raises(ValueError, match="larger than 1920 x 1088"):
         SceneRenderer(start(Recipe(), ["free"]), 0, width=4000, height=100)
