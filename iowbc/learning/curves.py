@@ -113,7 +113,7 @@ TITLES = {
     "tracking": "tracking of the command [share of the best]",
     "infeasible_pushes": "infeasible pushes [share]",
     "divergences": "simulations that diverged",
-    "rollbacks": "returns to the best policy",
+    "rollbacks": "returns to the best policy since it improved",
     "reward": "reward [1/s]",
     "curriculum_level": "level, mean of all axes",
     "check/score": "score of the check",

@@ -81,7 +81,8 @@ class Learner:
         """Acting part of the policy before the last update; empty before the first one and after a rollback."""
         self.gain: float | None = None
         """Mean normalised advantage that the last update gained, on the rollout after it: an estimate from samples that
-        the update has not seen, while -`policy_loss` is one from those that it has."""
+        the update has not seen, while -`policy_loss` is one from those that it has. Until `statistics_until` the change
+        of the normalisation is part of it."""
         self.seconds = dict.fromkeys(("simulation", "inference", "learning"), 0.0)
         """Time per part since the last reset [s]."""
         self.value_alone = 0
@@ -124,7 +125,9 @@ class Learner:
         if self.observation is None:
             self.observation = env.reset()
         if settings.group > 1:
-            self.observation = env.copy(drawn_leaders(env.num_envs, settings.group))
+            leaders = drawn_leaders(env.num_envs, settings.group)
+            self.observation = env.copy(leaders)
+            self.normalization.discounted = self.normalization.discounted[leaders]
         self.normalization.frozen = self.steps >= settings.statistics_until
         begin = time.perf_counter()
         with torch.inference_mode():
@@ -251,10 +254,14 @@ class Learner:
             parameter.grad = torch.stack(parts).sum(0) if len(parts) > 1 else parts[0]
         torch.nn.utils.clip_grad_norm_(parameters, self.settings.gradient_norm)
         policy.optimizer.step()
+        self.bound_deviation()
+        return torch.stack(figures).sum(0)
+
+    def bound_deviation(self) -> None:
+        """Clip the standard deviation to its bounds."""
         low, high = deviation_bounds(self.settings, self.steps)
         with torch.no_grad():
-            policy.log_stds.clamp_(float(np.log(low)), float(np.log(high)))
-        return torch.stack(figures).sum(0)
+            self.policy.log_stds.clamp_(float(np.log(low)), float(np.log(high)))
 
     def _loss(self, samples: dict[str, Tensor], before: Tensor) -> tuple[Tensor, Tensor]:
         """The loss of samples, and `FIGURES`; their advantages are normalised."""

@@ -134,7 +134,9 @@ class TeacherTraining:
             else:
                 self.best.offer(found["check/score"], self._scored())
         if why:
+            returns = self.model.normalization.discounted  # of episodes that go on
             self._restore_learner(self.best.go_back(f"{why} at {self.steps:,} steps"))
+            self.model.normalization.discounted = returns
             low = 0.0 if self.settings.desired_kl is None else min(self.settings.learning_rate_range)
             self.model.learning_rate = max(low, self.settings.check.caution * self.model.learning_rate)
             self.say(f"{why} at {self.steps:,} steps: goes back to the best policy, with smaller steps")
@@ -197,6 +199,7 @@ class TeacherTraining:
             names = "teacher.hidden, activation, symmetry and history (estimate, too)"
             path, _ = self.settings.beginning
             raise StageFailed(f"{path}: that policy's networks are other ones; {names} say which") from error
+        model.bound_deviation()
         model.normalization.inherited = network.normalizer.mean.numpy(), network.normalizer.std.numpy()
         model.normalization.move(model.policy.normalizer)
         if self.average:

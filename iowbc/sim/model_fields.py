@@ -19,6 +19,8 @@ FIELDS = (
 """Model fields that differ between simulations."""
 WHEELS = ("tendon_frictionloss", "tendon_damping", "wrap_prm")
 """Further fields that differ for a crate's wheels."""
+STEPPED = ("actuator_forcerange", *WHEELS)
+"""Fields that are written in each control period; an episode begins with their nominal values."""
 
 
 class ModelFields:
@@ -61,6 +63,8 @@ class ModelFields:
         fields["actuator_biasprm"][ids, :, 2] = nominal["actuator_biasprm"][:, 2] * drawn["kd_scale"]
         fields["actuator_delay"][ids] = self._timing.delay(drawn["action_latency"])[:, None]
         fields["geom_friction"][ids[:, None], self._layout.foot_geoms, 0] = drawn["ground_friction"][:, None]
+        for name in fields.keys() & STEPPED:
+            fields[name][ids] = nominal[name]
         if self._layout.object is not None:
             self._write_object(ids, drawn)
         self.derive(ids)

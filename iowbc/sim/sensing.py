@@ -57,6 +57,7 @@ class Sensing:
         self._deviation[which, self._width :] *= state.has_object[which, None]
         self._robot_line.set_latency(which, drawn["sensor_latency"][which])
         self._object_line.set_latency(which, drawn["object_latency"][which])
+        self._sensed["heading"][which] = 0.0  # it is unwrapped from here on
         self._sense(state)
         self._robot_line.fill(which, self._robot[which])
         self._object_line.fill(which, self._object[which])

@@ -51,6 +51,22 @@ def test_a_reset_plays_the_same_episode_again(make: Make) -> None:
     assert same(*courses)
 
 
+def test_an_episode_does_not_depend_on_the_one_before(make: Make) -> None:
+    scenes = ("free", "lift", "squeeze", "tyre", "push")
+    shares = {f"task.scenes.{name}": 0.2 for name in scenes}
+    episodes = [episode(scene, seed=seed) for seed, scene in enumerate(scenes * 3)]
+    env = make(num_envs=len(episodes), changes=shares, episodes=episodes)
+    first, state, random = env.reset(), env.state(), np.random.default_rng(0)
+    for steps in (9, 17, 25):
+        for _ in range(steps):
+            env.step(4.0 * random.normal(size=(len(episodes), 15)).astype(np.float32))
+        assert np.array_equal(env.reset(), first)
+        again = env.state()
+        kept = [name for name in state if name.startswith("simulation/sens")]
+        assert kept
+        assert [name for name in kept if not np.array_equal(again[name], state[name])] == []
+
+
 def test_fixed_quantities_are_held_and_the_rest_is_drawn(make: Make) -> None:
     env = make(num_envs=2, episodes=[episode(object_mass=4.0, partner_share=0.0), episode(seed=6)])
     env.reset()

@@ -55,7 +55,7 @@ class Curriculum(Section):
     posture: Scale = Scale(start=0.2, full=1.0, extreme=1.0)
     """Factor on the ranges of height, pitch and wrist offsets, around the nominal posture."""
     load: Scale = Scale(start=0.15, full=1.0, extreme=1.3)
-    """Upper end of the mass range, relative to the scene's own; the lower end is constant. At 1.3 the box weighs up to
+    """Width of the mass range above its lower end, relative to the scene's own. At 1.3 the box weighs up to
     13.5 kg, and shoulders hold 12 to 16."""
     resistance: Scale = Scale(start=0.5, full=1.0, extreme=3.0)
     """Factor on a crate's rolling resistance at each level of load; at 3 it is near the limit of foot friction."""
