@@ -24,15 +24,19 @@ def is_disk_full(error: BaseException) -> bool:
 
 def what_is_full(error: BaseException, places: Sequence[Path]) -> str:
     """Disk that is full, with its free bytes, else the file that an error names."""
-    files = [str(found.filename) for found in _chain(error) if isinstance(found, OSError) and found.filename]
+    files = [_file(found) for found in _chain(error) if isinstance(found, OSError) and _file(found)]
     for place in (*(Path(file).parent for file in files), *places):
         if (free := _free(place)) is not None and free < ROOM:
             return f"the disk of {place} is full ({free:,} bytes are free)"
     for found in _chain(error):
         if isinstance(found, OSError) and found.errno in FULL:
-            file = f"{found.filename} cannot be written" if found.filename else "a file cannot be written"
-            return f"{file}: {found.strerror}"
+            return f"{_file(found) or 'a file'} cannot be written: {found.strerror}"
     return "a file cannot be written: no space is left"
+
+
+def _file(error: OSError) -> str:
+    """The file that could not be written: of two, as in a copy, the second."""
+    return str(error.filename2 or error.filename or "")
 
 
 def _chain(error: BaseException | None) -> Iterator[BaseException]:

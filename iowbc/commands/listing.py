@@ -123,7 +123,7 @@ def ls(
     if artifacts:
         console.print(table)
     else:
-        tell(console, f"nothing is stored in {store.runs.store} yet; `iowbc run RECIPE` makes it")
+        tell(console, f"no {stage or 'artifact'} is stored in {store.runs.store} yet; `iowbc run RECIPE` makes it")
 
 
 def show(word: options.Named, as_json: options.AsJson = False, runs: options.RunsFolder = options.RUNS) -> None:
@@ -157,7 +157,10 @@ def show(word: options.Named, as_json: options.AsJson = False, runs: options.Run
         "took": f"{duration(manifest.seconds)} in {manifest.attempts} attempt(s) with {manifest.workers} worker(s)",
         "reads": "\n".join(f"{name} (content {digest[:KEY_LENGTH]})" for name, digest in inputs.items()),
         "metrics": "\n".join(f"{name} {figure(value, 6)}" for name, value in artifact.metrics.items()),
-        "files": "\n".join(f"{name} ({decimal(record.size)})" for name, record in manifest.files.items()),
+        "files": "\n".join(
+            f"{name} ({decimal(record.size)}{', not published' if name in manifest.omitted else ''})"
+            for name, record in manifest.files.items()
+        ),
         "versions": ", ".join(f"{name} {version}" for name, version in manifest.versions.items()),
         "recipe": "\n".join([*unusual, "all else is default"]),
     }
@@ -179,6 +182,6 @@ def _data(artifact: Artifact) -> dict[str, Any]:
         "folder": shown_path(artifact.folder),
         "published": artifact.published,
         "bytes": artifact.size,
-        "files": {name: record.size for name, record in manifest.files.items()},
+        "files": {name: record.size for name, record in manifest.files.items() if name not in manifest.omitted},
         "metrics": artifact.metrics,
     }

@@ -8,7 +8,7 @@ from typer import Option
 from iowbc.commands import options
 from iowbc.commands.printed import shown_path, stdout_console, tell
 from iowbc.commands.request import Request, planners
-from iowbc.errors import UsageError
+from iowbc.errors import UsageError, nearest
 from iowbc.pipeline.stage_plan import Options
 from iowbc.pipeline.store.runs import Runs, require_writable_runs
 from iowbc.pipeline.store.store import Store
@@ -44,7 +44,8 @@ def publish(
     ]
     if lacking:
         raise UsageError(f"not finished: {', '.join(lacking)}; to finish: {request.command()}")
-    require_writable_runs(request.runs)
+    published = request.runs.published
+    require_writable_runs(request.runs, request.runs.locks, published, *published.glob("*/"))
     notes = {step.key: step.notes for plan in plans for step in plan}
     chains = [one for planner in found for one in planner.chain()]
     made = [step.artifact for one in chains for step in one.plan()]
@@ -53,14 +54,16 @@ def publish(
     names = {name for artifact in artifacts.values() for name in artifact.manifest.files}
     for name in without:
         if name not in names:
-            raise UsageError(f"--without {name}: no artifact has such a file; files: {', '.join(sorted(names))}")
+            known = nearest(name, names) or f"; files: {', '.join(sorted(names))}"
+            raise UsageError(f"--without {name}: no artifact has such a file{known}")
     for key, artifact in artifacts.items():
         to_leave_out = set(without) & set(artifact.manifest.files) - set(artifact.manifest.omitted)
         copy = artifact if artifact.published and not to_leave_out else Store(request.runs).publish(artifact, without)
-        left_out = ", ".join(copy.manifest.omitted)
-        lacks = [f"without {left_out}"] if left_out else []
+        omitted = copy.manifest.omitted
+        lacks = [f"without {len(omitted)} of {len(copy.manifest.files)} files"] if omitted else []
         what = f"{artifact.manifest.stage}: {shown_path(copy.folder)} ({decimal(copy.size)})"
-        tell(console, "; ".join([what, *lacks, *notes.get(key, ())]))
+        changes = () if copy is artifact else notes.get(key, ())
+        tell(console, "; ".join([what, *lacks, *changes]))
     size = sum(path.stat().st_size for path in request.runs.published.rglob("*") if path.is_file())
     console.print(f"{decimal(size)} are published in all", highlight=False)
     if size > LARGEST_REPOSITORY:

@@ -97,7 +97,7 @@ class Runner:
                 raise
             raise PipelineFailed(
                 f"{stage.name} failed: no space is left: {what_is_full(error, (self.store.runs.root,))}. "
-                "Its last checkpoint is kept; make some (`iowbc gc` removes what you name)"
+                "What is finished is kept, and so is the last checkpoint; make some (`iowbc gc` removes what you name)"
             ) from error
         finally:
             self.display.end()

@@ -5,6 +5,7 @@ import base64
 import binascii
 import hashlib
 import zlib
+from importlib.util import decode_source
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
@@ -76,6 +77,17 @@ class ModuleFile(EmbeddedFile):
 
     suffixes: ClassVar[tuple[str, ...]] = (".py",)
     largest: ClassVar[int] = 100_000
+
+    @classmethod
+    def taken_in(cls, file: Path, path: str) -> Self:
+        """As for any file; raises ValueError also for one that is no Python."""
+        own = super().taken_in(file, path)
+        try:
+            compile(decode_source(own.unpacked()), path, "exec")
+        except (SyntaxError, UnicodeDecodeError) as error:
+            line = f", line {error.lineno}" if isinstance(error, SyntaxError) and error.lineno else ""
+            raise ValueError(f"{file}{line}: {error.msg if isinstance(error, SyntaxError) else error}") from None
+        return own
 
 
 class MeshFile(EmbeddedFile):

@@ -43,11 +43,13 @@ class Group:
     @property
     def seeds(self) -> tuple[str, ...]:
         """Seed of each run's training; where seeds are equal, the labels of the runs."""
-        for path in ("skill.learning.seed", "teacher.seed"):
-            own = [(flattened(run.recipe).get(path), run.recipe.get("seed", 0)) for run in self.runs]
-            seeds = [str(int(usual if seed is None else seed)) for seed, usual in own]
-            if len({*seeds}) == len(seeds):
-                return tuple(seeds)
+        for path in ("skill.learning.seed", "teacher.seed", "seed"):
+            own = [flattened(run.recipe).get(path) for run in self.runs]
+            if any(seed is not None for seed in own):
+                usual = [run.recipe.get("seed", 0) for run in self.runs]
+                seeds = tuple(str(usual[place] if seed is None else seed) for place, seed in enumerate(own))
+                if len({*seeds}) == len(seeds):
+                    return seeds
         return tuple(run.label for run in self.runs)
 
     def values(self, stage: str, metric: str) -> NDArray[np.float64]:

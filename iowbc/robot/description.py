@@ -87,7 +87,7 @@ def robot_folder(name: str) -> Path:
     found = robot_folders()
     if name not in found:
         raise UsageError(
-            f"no robot {shown(name)}: looked for its robot.yaml in {', '.join(str(root) for root in _roots())}; "
+            f"no robot {shown(name)}: looked for its robot.yaml in {', '.join(dict.fromkeys(map(str, _roots())))}; "
             f"known robots: {', '.join(found) or 'none'}"
         )
     return found[name]

@@ -246,7 +246,7 @@ def test_the_runs_folder_can_be_named_by_option_or_environment(
     other = str(folder / "elsewhere")
     assert f"nothing has run in {other} yet" in command("status", "--runs", other).stdout.replace("\n", "")
     monkeypatch.setenv("IOWBC_RUNS", other)
-    assert f"nothing is stored in {other}/store yet" in command("ls").stdout.replace("\n", "")
+    assert f"no artifact is stored in {other}/store yet" in command("ls").stdout.replace("\n", "")
 
 
 def test_schema_is_written_for_editors(folder: Path, command: Command) -> None:

@@ -69,6 +69,8 @@ def test_errors_that_say_that_nothing_fits_are_known_however_they_are_wrapped(tm
         assert is_disk_full(error)
     assert not is_disk_full(OSError(errno.EACCES, "Permission denied"))
     assert what_is_full(wrapped, ()) == f"{tmp_path / 'file'} cannot be written: No space left on device"
+    copied = OSError(errno.ENOSPC, "No space left on device", "source", None, "target")
+    assert what_is_full(copied, ()) == "target cannot be written: No space left on device"
 
 
 def test_a_full_disk_is_named_with_what_is_free(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

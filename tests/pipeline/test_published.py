@@ -120,17 +120,25 @@ def test_publishing_copies_verifies_and_refuses_what_has_not_run(workplace: Work
     assert "cached (published)" in workplace.command("plan", "small.yaml", "--until", "teacher").output
 
 
+def test_publishing_into_a_file_is_refused_before_anything_is_copied(workplace: Workplace) -> None:
+    workplace.run()
+    workplace.store.runs.published.write_text("")
+    refused = workplace.command("publish", "small.yaml")
+    assert refused.code == 2
+    assert "published is not a folder" in refused.errors
+
+
 def test_publishing_leaves_out_the_files_that_are_named(workplace: Workplace) -> None:
     workplace.run()
     unknown = workplace.command("publish", "small.yaml", "--without", "curve.png")
     assert unknown.code == 2
-    assert "--without curve.png: no artifact has such a file; files: figures/curve.png, " in unknown.errors
+    assert "--without curve.png: no artifact has such a file; did you mean 'figures/curve.png'?" in unknown.errors
     assert not workplace.store.runs.published.exists()
     assert workplace.command("publish", "small.yaml").code == 0
     shutil.rmtree(workplace.store.runs.store)
     assert list(workplace.store.runs.published.glob("*/*/figures/curve.png"))
     done = workplace.command("publish", "small.yaml", "--without", "figures/curve.png")
-    assert done.output.count("; without figures/curve.png") == 6
+    assert done.output.count("; without 1 of ") == 6
     assert not list(workplace.store.runs.published.glob("*/*/figures/curve.png"))
     assert all(step.cached for step in workplace.plan().values())
 

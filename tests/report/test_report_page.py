@@ -330,6 +330,11 @@ def test_a_phone_without_a_network_draws_every_curve(runs: list[Run], tmp_path: 
     assert drawn.count('class="main-svg"') >= len(places)
 
 
+def test_a_run_alone_has_the_seed_of_its_training() -> None:
+    recipe = {"seed": 0, "skill": {"learning": {"seed": None}}, "teacher": {"seed": 1}}
+    assert grouped([Run("second", {}, recipe)])[0].seeds == ("1",)
+
+
 def test_trainings_of_the_skill_that_differ_in_their_seed_are_one_variant() -> None:
     runs = [Run(f"{seed}", {}, {"seed": 0, "skill": {"learning": {"seed": seed, "games": 8}}}) for seed in (1, 2)]
     (group,) = grouped(runs)

@@ -52,7 +52,6 @@ def test_with_a_width_it_is_a_kernel(opened: Open, tmp_path: Path) -> None:
             "def hlaf(step):\n    return 0\n",
             r"has no function 'half'; there are: hlaf; did you mean 'hlaf'",
         ),
-        ("x = 1\ndef half(step:\n", r"cannot be executed: SyntaxError: .* in line 2"),
         ("import numpi\n", r"cannot be executed: ModuleNotFoundError: .*numpi.* in line 1"),
         ("raise SystemExit(3)\n", r"cannot be executed: SystemExit: 3 in line 1"),
     ],
@@ -62,6 +61,11 @@ def test_a_file_that_cannot_be_used_is_named_before_processes_start(
 ) -> None:
     with pytest.raises(StageFailed, match=f"task.reward.own.mine: rewards.py: {text}"):
         opened(own_recipe(tmp_path, source), workers=1)
+
+
+def test_a_file_that_is_no_python_is_refused_as_the_recipe_is_read(tmp_path: Path) -> None:
+    with pytest.raises(RecipeError, match=r"rewards.py, line 2: '\(' was never closed"):
+        own_recipe(tmp_path, "x = 1\ndef half(step:\n")
 
 
 def test_its_file_may_define_dataclasses_and_begin_with_a_byte_order_mark(opened: Open, tmp_path: Path) -> None:

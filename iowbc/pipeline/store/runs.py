@@ -78,9 +78,11 @@ def _read(path: Path, parsed: Callable[[str], Any]) -> dict[str, Any]:
     return found if isinstance(found, dict) else {}
 
 
-def require_writable_runs(runs: Runs) -> None:
-    """Make the folder of runs where it is missing. Raises `UsageError` where it, or a part of it, cannot be written."""
-    parts = (runs.store, *runs.store.glob("*"), runs.work, runs.damaged, runs.locks, runs.recipes, runs.tracking)
+def require_writable_runs(runs: Runs, *parts: Path) -> None:
+    """Make the folder of runs where it is missing. Raises `UsageError` where it cannot be written, or one of its
+    `parts`, by default all that a run writes."""
+    usual = (runs.store, *runs.store.glob("*"), runs.work, runs.damaged, runs.locks, runs.recipes, runs.tracking)
+    parts = parts or usual
     require_writable(runs.root, "--runs", next(filter(None, map(_closed, parts)), ""))
 
 
