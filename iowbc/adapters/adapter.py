@@ -148,8 +148,8 @@ def _value_problems(adapter: Adapter, robot: Robot, frequency: float) -> Iterato
     elif own != frequency:
         text = f"frequency: is {own:g} Hz, the trials run at {frequency:g} Hz"
         yield f"{text}; set task.control_frequency to it"
-    if adapter.history < 1:
-        yield f"history: is {adapter.history}, expected at least the present observation"
+    if not isinstance(adapter.history, int) or adapter.history < 1:
+        yield f"history: is {adapter.history!r}, expected a number of observations, the present one included"
     for name, bounds in (adapter.ranges or {}).items():
         if name not in VELOCITIES:
             yield f"ranges: {name}: no such velocity; valid: {', '.join(VELOCITIES)}"

@@ -101,9 +101,24 @@ def policy_path(named: str) -> Path:
 
 
 def policy_digest(path: Path) -> str:
-    """SHA-256 of a file, hexadecimal; for a folder, of the sorted lines `DIGEST  NAME` of all files below it."""
+    """SHA-256 of a file, hexadecimal; for a folder, of the sorted lines `DIGEST  NAME` of all files below it. Raises
+    StageFailed for an ONNX file whose weights are in another file."""
     if path.is_file():
+        if path.suffix == ".onnx" and _has_external_weights(path):
+            text = "keeps weights in another file, which its digest would not cover; save it as one file"
+            raise StageFailed(f"{PLACE}.policy: {path}: {text}")
         return file_digest(path)
     files = [file for file in path.rglob("*") if file.is_file()]
-    lines = sorted(f"{policy_digest(file)}  {file.relative_to(path).as_posix()}\n" for file in files)
+    lines = sorted(f"{file_digest(file)}  {file.relative_to(path).as_posix()}\n" for file in files)
     return hashlib.sha256("".join(lines).encode()).hexdigest()
+
+
+def _has_external_weights(path: Path) -> bool:
+    import onnx
+    from onnx.external_data_helper import uses_external_data
+
+    try:
+        graph = onnx.load(path, load_external_data=False).graph
+    except Exception:  # no ONNX file, which its adapter reports
+        return False
+    return any(uses_external_data(weights) for weights in graph.initializer)

@@ -19,8 +19,11 @@ INFRASTRUCTURE = ("pipeline", "errors", "files", "full_disk", "processes")
 IN_KEYS = "recipe.recipe"
 """The module of the whole recipe, whose imports are ignored: its values are in keys, and sections count only if a
 stage's code imports them itself."""
-RECORDED_PACKAGES = ("crocoddyl", "mujoco", "numpy", "onnxruntime", "pin", "stable-baselines3", "torch")
-"""Versions of these are kept with every artifact."""
+RECORDED_PACKAGES = (
+    *("coal", "crocoddyl", "daqp", "drake", "mujoco", "numpy", "onnxruntime", "pin", "scikit-learn", "scipy"),
+    *("stable-baselines3", "torch"),
+)
+"""Packages that shape results; their versions are kept with every artifact."""
 CODE_DIGITS = 12
 """Hexadecimal digits of the digest by which machines compare their code."""
 

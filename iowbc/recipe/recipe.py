@@ -91,6 +91,8 @@ class Recipe(Section):
         if self.rg.height == "com" and self.task.references.height is not None:
             text = "compares the pelvis with its commanded height"
             yield "task.references.height", f"{text}, and rg.height: com commands that of the centre of mass"
+        if self.rg.height == "com" and self.eval.policy in ("model", "public"):
+            yield "rg.height", f"com commands the centre of mass; eval.policy: {self.eval.policy} follows the pelvis"
         if self.task.action.previous_share and self.eval.policy in ("model", "public"):
             yield "task.action.previous_share", f"eval.policy: {self.eval.policy} sets joint targets itself; take 0"
         yield from _scene_name_problems(self)

@@ -66,7 +66,7 @@ class Batch:
         self._pushes = PlannedPushes(schedule.planned("push"), period)
         self._pulls = PlannedPulls(schedule.planned("pull"), period)
         self._action, self._scale = task.action, action_scale(self.robot, task.action)
-        arms = None if recipe.eval.public is None else recipe.eval.public.arms
+        arms = None if specification.public is None else specification.public.arms
         self._own_arms = np.flatnonzero([arms == "own" or (arms == "free" and name == FREE) for name in scenes])
         """Environments in which a public controller moves its arms, (k,)."""
 

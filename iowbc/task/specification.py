@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Self
 
+from iowbc.recipe.evaluation.baselines import PublicController
 from iowbc.recipe.evaluation.evaluation import Drake
 from iowbc.recipe.recipe import Recipe
 
@@ -18,6 +19,8 @@ class Specification:
     """Folder of the fitted reference generator; without one θ_S_ref is the default posture."""
     drake: Drake | None = None
     """Settings of Drake as the physics engine; None selects MuJoCo."""
+    public: PublicController | None = None
+    """The public controller of trials, which may move the arms; None for any other policy."""
 
     @property
     def deployed(self) -> Self:

@@ -108,10 +108,12 @@ class Twin:
     def step(self) -> None:
         motors = self._command["motor_cmd"][: len(self.robot.joints)]
         enabled = motors["mode"] == 1
-        kp, kd = (np.where(enabled, motors[name], 0.0).astype(np.float64) for name in ("kp", "kd"))
-        if self._silent > SILENCE * FREQUENCY and kp.any():
-            kp, kd = 0.0 * kp, self.robot.kd
-        tau, dq = (np.where(enabled, motors[name], 0.0).astype(np.float64) for name in ("tau", "dq"))
+        kp, kd, tau, dq = (
+            np.where(enabled, motors[name], 0.0).astype(np.float64) for name in ("kp", "kd", "tau", "dq")
+        )
+        if self._silent > SILENCE * FREQUENCY:
+            tau, dq, kd = 0.0 * tau, 0.0 * dq, self.robot.kd if kp.any() else kd
+            kp = 0.0 * kp
         self._drive(kp, kd, motors["q"], dq, tau)
         self.periods += 1
         self._silent += 1

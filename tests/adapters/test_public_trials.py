@@ -3,6 +3,7 @@
 import hashlib
 import json
 from collections.abc import Mapping
+from contextlib import closing
 from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
@@ -249,3 +250,14 @@ def test_a_plan_does_not_need_what_it_plays() -> None:
     done = CliRunner().invoke(app, ["plan", str(RECIPES / "public.yaml"), "--json"])
     assert done.exit_code == 0, done.output
     assert len(json.loads(done.stdout)) == 2
+
+
+def test_a_training_does_not_move_the_arms_of_a_public_controller(tmp_path: Path) -> None:
+    own = recipe(holosoma_file(tmp_path / "walker.onnx"))
+    public = own.eval.public
+    assert public is not None
+    own = own.model_copy(
+        update={"eval": own.eval.model_copy(update={"public": public.model_copy(update={"arms": "own"})})}
+    )
+    with closing(VectorEnv(Specification(own, robot_folder("g1")), num_envs=1, workers=0, seed=0)) as training:
+        assert training.action_space.shape == (15,)

@@ -4,6 +4,7 @@ import hashlib
 from pathlib import Path
 
 import numpy as np
+import onnx
 import pytest
 import torch
 import yaml
@@ -43,6 +44,13 @@ def test_the_wheel_that_is_missing_is_named_with_the_extra(monkeypatch: pytest.M
     monkeypatch.setattr("iowbc.adapters.source.find_spec", lambda name: None)
     with pytest.raises(StageFailed, match=r"needs the package holosoma_inference.*pip install '\.\[public\]'"):
         policy_path("holosoma_inference:models/walker.onnx")
+
+
+def test_weights_in_another_file_are_refused_because_no_digest_covers_them(tmp_path: Path) -> None:
+    graph = onnx.load(holosoma_file(tmp_path / "whole.onnx"))
+    onnx.save_model(graph, tmp_path / "walker.onnx", save_as_external_data=True, location="rest", size_threshold=0)
+    with pytest.raises(StageFailed, match=r"walker.onnx: keeps weights in another file, .* save it as one file"):
+        policy_digest(tmp_path / "walker.onnx")
 
 
 def test_the_digest_of_a_folder_is_that_of_its_sums(tmp_path: Path) -> None:

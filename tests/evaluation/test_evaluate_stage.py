@@ -194,6 +194,12 @@ def test_a_damaged_batch_is_played_again(done: Job, recipe: Recipe, student: Pat
     assert damaged.with_name("trials-0-0.batch.damaged").is_file()
 
 
+def test_a_batch_of_other_trials_is_played_again(done: Job, recipe: Recipe, student: Path, tmp_path: Path) -> None:
+    (tmp_path / "trials-0-0.batch").write_bytes((done.work / "trials-0-1.batch").read_bytes())
+    protocol = Protocol(Specification(recipe, done.robot), load_policy(student), work=tmp_path, workers=0)
+    pd.testing.assert_frame_equal(protocol.run(), pd.read_parquet(done.out / "trials.parquet"))
+
+
 def test_a_sweep_goes_on_after_its_last_finished_mass(done: Job, recipe: Recipe, student: Path, tmp_path: Path) -> None:
     stopping = job(recipe, student, tmp_path)
     finished = "trials-0-0.batch"

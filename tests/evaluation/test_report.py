@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from made_up_trials import trials_of
+from matplotlib.colors import to_hex
 from matplotlib.container import ErrorbarContainer
 
 from iowbc.evaluation.paper import LIFTING, PUSHING, VARIANTS, reported
@@ -158,6 +159,14 @@ def test_no_two_variants_look_alike() -> None:
     variants = [*VARIANTS, "another", "one more"]
     assert len({tuple(style_of(variant, variants).values()) for variant in variants}) == len(variants)
     assert style_of("one more", ["IO-WBC", "one more"]) != style_of("IO-WBC", ["IO-WBC", "one more"])
+
+
+def test_a_variant_has_its_colour_in_a_panel_without_the_others() -> None:
+    swept = [trials_of(name, "lifting", {0.0: 5, 4.0: 5}) for name in ("one", "other")]
+    figure = comparison(aggregate(pd.concat([*swept, trials_of("other", "heavy", {18.0: 4}, "tyre")])), 0.8)
+    heavy = figure.axes[-1]
+    (bar,) = (bar for bar in heavy.patches if np.isfinite(bar.get_height()))
+    assert to_hex(bar.get_facecolor()) == style_of("other", ["one", "other"])["color"].lower()
 
 
 def test_what_was_not_evaluated_is_told_from_what_failed() -> None:

@@ -72,6 +72,17 @@ def test_motors_brake_once_commands_stay_away(twin: Twin) -> None:
     assert (np.abs(twin.simulation.state.joint_torque[0]) <= limit).all()
 
 
+def test_a_stale_torque_does_not_outlast_the_commands(twin: Twin) -> None:
+    command = holding(twin)
+    command["motor_cmd"][15]["tau"] = 8.0
+    command["crc"] = messages.checksum(command)
+    twin.command(command)
+    for _ in range(round(SILENCE * 500) + 250):
+        twin.step()
+    state = twin.simulation.state
+    assert state.joint_torque[0, 15] * state.joint_velocity[0, 15] < 0.0, "it brakes"
+
+
 def test_a_motor_without_gains_has_the_torque_of_its_command(twin: Twin) -> None:
     command = holding(twin)
     motors = command["motor_cmd"][:29]

@@ -132,6 +132,11 @@ def test_feedback_on_the_feet_of_a_gait_prior_that_is_off_is_refused(tmp_path: P
     assert "height: stretches the legs of the gait prior, which is off" in text
 
 
+def test_a_controller_that_follows_the_pelvis_is_commanded_no_centre_of_mass(tmp_path: Path) -> None:
+    (found,) = problems(tmp_path, "rg: {height: com}\neval: {policy: model}\n")
+    assert "'rg.height' = 'com': com commands the centre of mass; eval.policy: model follows the pelvis" in found
+
+
 def test_a_controller_that_sets_joint_targets_itself_follows_no_previous_action(tmp_path: Path) -> None:
     (found,) = problems(tmp_path, "task: {action: {previous_share: 0.5}}\neval: {policy: model}\n")
     assert "task.action.previous_share" in found

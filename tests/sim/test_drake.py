@@ -96,6 +96,15 @@ def test_motors_follow_their_targets_as_late_as_drawn(drake, calm):
     assert moved[0] > 10.0 * moved[1]
 
 
+def test_bodies_that_the_model_excludes_do_not_touch(drake, calm, start):
+    recipe = changed(calm, "physics.body_contact", "everything")
+    pair = drake(recipe, ["free"]), start(recipe, ["free"])
+    for simulation in pair:
+        run(simulation, 20)
+    one, other = (simulation.state.joint_torque for simulation in pair)
+    assert one == pytest.approx(other, abs=3.0)
+
+
 def test_a_grip_lets_go_above_its_slip_force(drake, calm):
     simulation = drake(calm, ["lift"] * 2, surface_friction=np.array([0.05, 1.0]))
     run(simulation, 50)

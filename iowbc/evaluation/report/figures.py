@@ -94,7 +94,7 @@ def comparison(summary: pd.DataFrame, capacity_rate: float) -> Figure:
     if carrying:
         _capacity_bars(panels[-2], capacities, carrying)
         panels[-2].set(title=f"load capacity at {100 * capacity_rate:.0f} % success", ylabel="mass [kg]")
-    _success_panel(panels[-1], _heaviest(summary), "success rate")
+    _success_panel(panels[-1], _heaviest(summary), variants_of(summary), "success rate")
     known = any(in_paper(summary[summary["suite"] == suite]) for suite in sweeps)
     return finish(figure, panels, _note(known) if sweeps else "", panels[0])
 
@@ -114,7 +114,7 @@ def robustness(summary: pd.DataFrame, rate: float) -> Figure:
             _capacity_bars(axes, survived, list(dict.fromkeys(chosen["case"])))
             axes.set(title=f"impulse survived, {masses_of(chosen)}", ylabel="impulse [N·s]")
         else:
-            _success_panel(axes, chosen, f"success, {chosen['suite'].iloc[0]}")
+            _success_panel(axes, chosen, variants_of(summary), f"success, {chosen['suite'].iloc[0]}")
         axes.set_xlim(-0.6, CASES_PER_ROW - 0.4)
     return finish(figure, panels, "", panels[0])
 
@@ -130,7 +130,8 @@ def draw_bars(
     the top of each bar, (2, labels), for variants with intervals."""
     width = 0.8 / max(len(heights), 3)
     upright = (
-        len(heights) > VARIANTS_PER_PANEL and max(len(text) for row in texts.values() for text in row) > LONGEST_TEXT
+        len(heights) > VARIANTS_PER_PANEL
+        and max((len(text) for row in texts.values() for text in row), default=0) > LONGEST_TEXT
     )
     for place, (variant, values) in enumerate(heights.items()):
         positions = np.arange(len(labels)) + (place - (len(heights) - 1) / 2) * width
@@ -213,10 +214,10 @@ def _heaviest(summary: pd.DataFrame) -> pd.DataFrame:
     return swept[swept["mass"] == swept.groupby("suite")["mass"].transform("max")]
 
 
-def _success_panel(axes: Axes, chosen: pd.DataFrame, title: str) -> None:
+def _success_panel(axes: Axes, chosen: pd.DataFrame, variants: Sequence[str], title: str) -> None:
     names = list(dict.fromkeys(zip(chosen["case"], chosen["mass"], strict=True)))
     heights, texts, intervals = {}, {}, {}
-    for variant in variants_of(chosen):
+    for variant in variants:
         rows = chosen[chosen["variant"] == variant].set_index(["case", "mass"]).reindex(names)
         rate, low, high = (100 * rows[name].to_numpy(float) for name in ("rate", "rate_low", "rate_high"))
         counts = zip(rows["succeeded"], rows["trials"], strict=True)

@@ -1,5 +1,7 @@
 """Tables and figures of interaction: forces, work, velocity errors and impedance with partners; pushes by friction."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
@@ -107,15 +109,16 @@ def compliance_figure(summary: pd.DataFrame) -> Figure:
     behaviours = summary[summary["kind"] == "compliance"]
     figure = Figure(figsize=(11.0, 7.0), layout="constrained")
     panels = list(figure.subplots(2, 2).flat)
-    _behaviour_bars(panels[0], behaviours, "handle_force_p95", "horizontal force at the handle, p95 [N]")
-    _behaviour_bars(panels[1], behaviours, "hand_force_p95", "horizontal force at a hand, p95 [N]")
-    _behaviour_bars(panels[2], behaviours, "E_v_partner", "handle against partner [m/s]")
-    _impedance_curves(panels[3], summary[summary["kind"] == "impedance"], variants_of(summary))
+    variants = variants_of(summary)
+    _behaviour_bars(panels[0], behaviours, variants, "handle_force_p95", "horizontal force at the handle, p95 [N]")
+    _behaviour_bars(panels[1], behaviours, variants, "hand_force_p95", "horizontal force at a hand, p95 [N]")
+    _behaviour_bars(panels[2], behaviours, variants, "E_v_partner", "handle against partner [m/s]")
+    _impedance_curves(panels[3], summary[summary["kind"] == "impedance"], variants)
     title = "forces: means over all trials, whiskers: peaks; (c), (d): over surviving trials, × none"
     return finish(figure, panels, title, panels[0] if len(behaviours) else panels[3])
 
 
-def _behaviour_bars(axes: Axes, chosen: pd.DataFrame, column: str, title: str) -> None:
+def _behaviour_bars(axes: Axes, chosen: pd.DataFrame, variants: Sequence[str], column: str, title: str) -> None:
     """Bars of a column by case, or a cross if no trial survived; whiskers up to the peak of a force."""
     axes.set_title(title)
     keys = ["suite", "case", "mass"]
@@ -123,7 +126,7 @@ def _behaviour_bars(axes: Axes, chosen: pd.DataFrame, column: str, title: str) -
     met = chosen[chosen[column if force else "handle_force_p95"].notna()]
     names = list(dict.fromkeys(met[keys].itertuples(index=False, name=None)))
     heights, texts, intervals = {}, {}, {}
-    for variant in variants_of(chosen):
+    for variant in variants:
         rows = chosen[chosen["variant"] == variant].set_index(keys).reindex(names)
         values = rows[column].to_numpy(np.float64)
         failed = np.isnan(values) & (rows["survived"].to_numpy(np.float64) == 0)

@@ -47,7 +47,8 @@ def load_capacities(summary: pd.DataFrame, rate: float) -> Capacities:
 
 def push_capacities(summary: pd.DataFrame, rate: float) -> Capacities:
     """Largest impulse on the base [N·s] in each direction up to which all reached the success rate."""
-    return _capacities(summary[summary["kind"] == "pushes"], "impulse", rate)
+    pushed = summary[summary["kind"] == "pushes"]
+    return {variant: {} for variant in variants_of(summary)} | _capacities(pushed, "impulse", rate)
 
 
 def _capacities(rows: pd.DataFrame, by: str, rate: float) -> Capacities:

@@ -1,5 +1,6 @@
 """Table and figure of the linear probe: true object mass and mass inferred from the policy's observations."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -92,7 +93,7 @@ def probe_figure(inferred: pd.DataFrame) -> Figure:
     figure = Figure(figsize=(10.5, 4.9), layout="constrained")
     panels = list(figure.subplots(1, 2))
     source, settled = str(inferred["source"].iloc[0]), inferred[inferred["settled"]]
-    _scatter(panels[0], settled[settled["source"] == source], source)
+    _scatter(panels[0], settled[settled["source"] == source], variants_of(inferred), source)
     _growth(panels[1], inferred)
     for axes in panels:
         axes.grid(True, color="0.9")
@@ -101,13 +102,13 @@ def probe_figure(inferred: pd.DataFrame) -> Figure:
     return finish(figure, panels, f"{title}rings: mean of a trial; dots: single readings; grey: as it is")
 
 
-def _scatter(axes: Axes, chosen: pd.DataFrame, source: str) -> None:
+def _scatter(axes: Axes, chosen: pd.DataFrame, variants: Sequence[str], source: str) -> None:
     ends = (float(chosen["mass"].min()), float(chosen["mass"].max()))
     axes.plot(ends, ends, color="0.55", linestyle="--", linewidth=1.2, zorder=0)
     for variant in variants_of(chosen):
         found = chosen[chosen["variant"] == variant]
         one, means = figures_of(found), found.groupby("trial")[["mass", "inferred"]].mean()
-        colour = style_of(variant, variants_of(chosen))["color"]
+        colour = style_of(variant, variants)["color"]
         axes.plot(found["mass"], found["inferred"], ".", color=colour, markersize=2, alpha=0.35, zorder=1)
         label = f"{variant}: R² {one['R2']:.2f}, RMSE {one['RMSE']:.2f} kg\n(trial's mean {one['R2_trial']:.2f}, "
         label += f"{one['RMSE_trial']:.2f} kg)"

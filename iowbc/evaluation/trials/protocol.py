@@ -12,7 +12,7 @@ import pandas as pd
 from iowbc.evaluation.trials.metrics import trial_row
 from iowbc.evaluation.trials.plan import Trial, case_trials, compliance_trials, map_trials, planned_sweeps, push_trials
 from iowbc.evaluation.trials.rollout import PolicyInBatch, play_episodes
-from iowbc.files import newest_checked, write_checked
+from iowbc.files import data_digest, newest_checked, write_checked
 from iowbc.learning.acting import Policy, load_policy
 from iowbc.recipe.recipe import Recipe, with_scenes
 from iowbc.recipe.task.joint_references import Grasps, Loads
@@ -33,7 +33,8 @@ def evaluated_world(specification: Specification) -> Specification:
     if recipe.eval.public is not None:
         from iowbc.adapters.source import adapted_robot
 
-        world = replace(world, robot=adapted_robot(recipe.eval.public, load_robot(world.robot), recipe.task))
+        robot = adapted_robot(recipe.eval.public, load_robot(world.robot), recipe.task)
+        world = replace(world, robot=robot, public=recipe.eval.public)
     if recipe.eval.engine == "drake":
         world = replace(world, drake=recipe.eval.drake)
     return replace(world, recipe=_with_trial_scenes(world.recipe)) if recipe.eval.scenes else world
@@ -125,10 +126,10 @@ class Protocol:
         found = batched_by_duration(trials, self.world.recipe.eval.batch)
         batches = {f"trials-{number}-{place}": batch for place, batch in enumerate(found)}
         if self.elsewhere is not None:
-            missing = {name: own for name, own in batches.items() if newest_checked(self._file(name), name)[0] is None}
+            missing = {name: own for name, own in batches.items() if self._finished(name, own) is None}
             ready = self.done + len(trials) - sum(map(len, missing.values()))
             for name, content in self.elsewhere(missing):
-                write_checked(self._file(name), name, content)
+                write_checked(self._file(name), _content(missing[name]), content)
                 ready += len(missing[name])
                 self.progress(ready, self.total, _suites(missing[name]))
         tables = [self._batch(name, batch) for name, batch in batches.items()]
@@ -138,9 +139,12 @@ class Protocol:
         """Cache file of a finished batch."""
         return self.work / f"{name}.batch"
 
+    def _finished(self, name: str, trials: Sequence[Trial]) -> bytes | None:
+        """A finished batch of these trials, as `played` returns it."""
+        return newest_checked(self._file(name), _content(trials))[0]
+
     def _batch(self, name: str, trials: Sequence[Trial]) -> pd.DataFrame:
-        path, suites = self._file(name), _suites(trials)
-        content, _ = newest_checked(path, name)
+        suites, content = _suites(trials), self._finished(name, trials)
         if content is None:
             longest = max(trial.episode.duration for trial in trials)
 
@@ -149,7 +153,7 @@ class Protocol:
                 self.progress(reached, self.total, f"{suites}, {seconds:.0f} s")
 
             content = played(self.world, self.policy, trials, self.workers, self.interrupted, progress)
-            write_checked(path, name, content)
+            write_checked(self._file(name), _content(trials), content)
         self.done += len(trials)
         if self.elsewhere is None:
             self.progress(self.done, self.total, suites)
@@ -180,6 +184,11 @@ def batched_by_duration(trials: Sequence[Trial], size: int) -> Iterator[list[Tri
         alike = [trial for trial, own in zip(trials, durations, strict=True) if own == duration]
         for first, last in shares_in_blocks(len(alike), math.ceil(len(alike) / size), 1):
             yield alike[first:last]
+
+
+def _content(trials: Sequence[Trial]) -> str:
+    """Digest of a batch's trials, to which its file is bound: a resumed stage may plan others."""
+    return data_digest([[one.suite, one.case, one.mass, one.number, one.episode.as_json()] for one in trials])
 
 
 def _suites(trials: Sequence[Trial]) -> str:

@@ -16,8 +16,8 @@ from iowbc.pipeline.cluster.spread import NodeSpread
 from iowbc.pipeline.stage import Job
 
 Event = tuple[Any, ...]
-"""`("metrics", values, step)`, `("progress", done, total, note)`, `("say", text)`, `("files", files)` of scratch,
-or `("shown", name)` of one of them for tracking."""
+"""`("metrics", values, step)`, `("progress", done, total, note)`, `("say", text)`, `("files", files)` of
+scratch."""
 REPORT_INTERVAL = 0.5
 """Seconds between two reports to the driver; the answer says whether to stop."""
 FILES_INTERVAL = 10.0

@@ -157,7 +157,8 @@ def new_journal(
     """Create a journal and start its run; `digest` identifies the work of the run. within: see `Tracker`."""
     stamp = time.strftime("%Y%m%d-%H%M%S")
     journal = Journal(runs.tracking / f"{stamp}-{name}-{os.getpid()}.jsonl")
-    journal.acquire(CHECKING_TIME)
+    while not journal.acquire(CHECKING_TIME):
+        pass  # a sender looks whether it is of a dead process
     journal.write("journal", uri=tracking_uri(), experiment=experiment, recipe=name, digest=digest)
     journal.write("run", id=PARENT, parent=within, name=name, tags=process_tags(), params=dict(params))
     return journal

@@ -1,7 +1,7 @@
 """Commands of trials: segments of a sequence, scripts drawn per trial, and fixed sequences.
 
 All fixed sequences command steps, so that a robot that stands still fails each of them. They respect
-`task.commands.rates` and stay within the feasible postures.
+`task.commands.rates` and stay within the feasible postures. Where a trial repeats a script, it starts again at once.
 """
 
 from typing import Annotated

@@ -163,17 +163,18 @@ def _ring(outward: Array, radius: float) -> list[Array]:
 
 
 def _exclude(model: Any, scene_graph: Any, shapes: list[list[Any]]) -> None:
-    """Excludes collisions of shapes whose contact bits in the model do not match."""
+    """Excludes collisions of shapes whose contact bits in the model do not match, or whose bodies it excludes."""
     present = [geom for geom, own in enumerate(shapes) if own]
-    is_a, touches = model.geom_contype, model.geom_conaffinity
+    is_a, touches, body = model.geom_contype, model.geom_conaffinity, model.geom_bodyid.tolist()
+    excluded = {frozenset(divmod(pair, 1 << 16)) for pair in model.exclude_signature.tolist()}
+
+    def touch(one: int, other: int) -> bool:
+        matching = is_a[one] & touches[other] or is_a[other] & touches[one]
+        return bool(matching) and frozenset((body[one], body[other])) not in excluded
+
     filters = CollisionFilterDeclaration()
     for geom in present:
-        apart = [
-            shape
-            for other in present
-            if other > geom and not (is_a[geom] & touches[other] or is_a[other] & touches[geom])
-            for shape in shapes[other]
-        ]
+        apart = [shape for other in present if other > geom and not touch(geom, other) for shape in shapes[other]]
         if apart:
             filters.ExcludeBetween(GeometrySet(shapes[geom]), GeometrySet(apart))
     scene_graph.collision_filter_manager().Apply(filters)

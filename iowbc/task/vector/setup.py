@@ -47,7 +47,7 @@ class Setup:
     def buffer_fields(self) -> Fields:
         """Arrays exchanged between the environments and the learner."""
         recipe, robot = self.specification.recipe, load_robot(self.specification.robot)
-        observation, support, public = full_layout(recipe, robot).size, len(robot.support), recipe.eval.public
+        observation, support, public = full_layout(recipe, robot).size, len(robot.support), self.specification.public
         action = support + (len(robot.interaction) if public is not None and public.moves_arms else 0)
         signals = signal_sizes(robot, planned=self.episodes is not None)
         return {
