@@ -129,10 +129,8 @@ def draw_bars(
     """Grouped bars of all variants for each label, with texts above; no bar for NaN. intervals: extent below and above
     the top of each bar, (2, labels), for variants with intervals."""
     width = 0.8 / max(len(heights), 3)
-    upright = (
-        len(heights) > VARIANTS_PER_PANEL
-        and max((len(text) for row in texts.values() for text in row), default=0) > LONGEST_TEXT
-    )
+    longest = max((len(text) for row in texts.values() for text in row), default=0)
+    upright = len(heights) > VARIANTS_PER_PANEL and longest > LONGEST_TEXT
     for place, (variant, values) in enumerate(heights.items()):
         positions = np.arange(len(labels)) + (place - (len(heights) - 1) / 2) * width
         colour = style_of(variant, list(heights))["color"]
