@@ -70,8 +70,8 @@ def write_comparison(
         raise UsageError("--film shows evaluated runs side by side: two or more must have finished the stage eval")
     require_whole(store.runs, (artifact for run in found for artifact in run.artifacts.values()))
     missing = [name for name in members_of(study) if name not in {run.label for run in tried}]
-    if tried and not study:
-        missing = [run.label for run in found if "eval" not in run.artifacts]
+    if tried:
+        missing += [run.label for run in found if "eval" not in run.artifacts and run.label not in missing]
     metrics = metrics_table(grouped(found))
     with named_lock(lock_path(store.runs, f"compare-{data_digest(str(output.resolve()))[:KEY_LENGTH]}")):
         start_comparison([run.label for run in found], output)
@@ -118,6 +118,8 @@ def report(
     """Write one self-contained HTML file about runs, readable offline. Raises `UsageError`."""
     store, console = Store(Runs(runs)), stdout_console()
     if log is not None:
+        if len(words) > 1:
+            raise UsageError("--log: name only the recipe whose export wrote it")
         from iowbc.commands.robot_log import report_log
 
         report_log(console, words[0], log, output or log.with_suffix(".png"))

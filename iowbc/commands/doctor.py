@@ -155,7 +155,7 @@ def _process(name: str, script: str, good: str, worst: Verdict, trouble: str) ->
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
     except subprocess.TimeoutExpired:
-        return Finding(name, "bad", f"no answer within {duration(PATIENCE)}")
+        return Finding(name, worst, f"no answer within {duration(PATIENCE)}")
     if done.returncode == 0:
         return Finding(name, "good", good + done.stdout.strip())
     last = (done.stderr.strip().splitlines()[-1:] or [""])[0]

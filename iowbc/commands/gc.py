@@ -61,6 +61,8 @@ def gc(
         require_writable_runs(store.runs)
     with named_lock(lock_path(store.runs, "gc")) if alone else nullcontext():
         for path in dict.fromkeys(_to_remove(store, unused, recipes or (), work, damaged, older_than)):
+            if not path.exists() or holder(store.runs, path.name):
+                continue  # removed or begun since it was listed
             if older_than and time.time() - path.stat().st_mtime < older_than * DAY:
                 continue
             count = sum(file.stat().st_size for file in (path, *path.rglob("*")) if file.is_file())

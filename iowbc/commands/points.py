@@ -98,7 +98,7 @@ class PointThread(threading.Thread):
         """`abort`: aborts all runs at once."""
         super().__init__(name=task.name)
         self.task, self.abort = task, abort
-        self._ending: RunEnding | None = None
+        self._ending = RunEnding(STAGE_FAILED, f"its log {task.log} cannot be written")
         self.start()
 
     def run(self) -> None:
@@ -106,8 +106,8 @@ class PointThread(threading.Thread):
             try:
                 self._ending = self.task.carried_out(log)
             except BaseException as error:
-                log.write(traceback.format_exc())
                 self._ending = RunEnding(STAGE_FAILED, f"{type(error).__name__}: {error}")
+                log.write(traceback.format_exc())
 
     def ending(self) -> RunEnding | None:
         return None if self.is_alive() else self._ending

@@ -213,6 +213,7 @@ def robot_sim(
                     _show(robot, view)
                 except EOFError:
                     view = None
+                    robot.simulation.planned_push[0] = robot.simulation.planned_impulse[0] = 0.0
                     tell(console, "the page has ended; the robot goes on")
             if robot.fallen and not reported:
                 reported = True

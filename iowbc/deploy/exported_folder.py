@@ -34,10 +34,11 @@ def exported_folder(word: Path | str) -> Path:
     shipped = [place for place in published if _recipe_name(place) == name]
     stored = {place.name: place for place in (*published, *runs.glob(f"store/{EXPORT}/*"))}
     keyed = [place for key, place in stored.items() if len(name) >= SHORTEST_PREFIX and key.startswith(name)]
-    found = next((place for place in (folder, runs / name / EXPORT, *shipped) if (place / CONTRACT).is_file()), None)
+    places = (folder, runs / name / EXPORT, *shipped)
+    found = next((place for place in places if os.path.isfile(place / CONTRACT)), None)
     if found is None and len(keyed) > 1:
         raise ContractBroken(f"{name}: the keys of {len(keyed)} exports begin like that; give more characters")
-    if found is None and not keyed and not folder.exists():
+    if found is None and not keyed and not os.path.exists(folder):
         made = [place.parent.name for place in runs.glob(f"*/{EXPORT}") if (place / CONTRACT).is_file()]
         names = sorted({*made, *filter(None, map(_recipe_name, published))})
         text = f"neither an export folder nor a recipe with an export; those with one: {', '.join(names) or 'none'}"

@@ -69,7 +69,7 @@ class Page:
         """Process the controls, advance, and draw if due; `now` [s] must not decrease."""
         if not self._now:
             self._now = self._due = now
-        elapsed, self._now = now - self._now, now
+        elapsed, self._now = min(now - self._now, BEHIND), now
         self._handle_buttons()
         if self.panel.showing.value != self._showing:
             self._change_to(self.panel.showing.value)

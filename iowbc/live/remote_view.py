@@ -83,8 +83,8 @@ def draw(server: viser.ViserServer, requests: Connection, robot: Robot, model: A
     button.on_click(lambda _: pressed.set())
     while True:
         begin = time.monotonic()
-        release = pressed.is_set()
-        pressed.clear()
+        if release := pressed.is_set():
+            pressed.clear()
         requests.send((release, spring_pulls(drawing.drags.now(drawing.away))))
         moment, text, supported = requests.recv()
         with server.atomic():

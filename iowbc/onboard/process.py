@@ -118,7 +118,7 @@ def listen(bus: "DdsBus", seconds: float, stopped: Callable[[], bool] = lambda: 
         states += bus.take(messages.LOW_STATE)
         others += len(bus.take(messages.LOW_COMMAND))
         battery = next(iter(bus.take(messages.BATTERY_STATE)[::-1]), battery)
-    return BusSnapshot(states, spent, battery, others, bus.high_level_mode(seconds))
+    return BusSnapshot(states, spent, battery, others, None if stopped() else bus.high_level_mode(seconds))
 
 
 def enable_realtime() -> str:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 
+from iowbc.errors import StageFailed
 from iowbc.pipeline.stage import ExternalInput, Job, Stage
 from iowbc.recipe.recipe import Recipe
 from iowbc.results.table import write_frame
@@ -82,7 +83,12 @@ def run(job: Job) -> None:
         lower[label] = on_controller(world, label, task, other, rg), other
     skills = [(asked.label, "own", "skill", "")] if "skill" in job.inputs else []
     for label, several in asked.others.items():
-        skills += [(label, str(place), f"{label}/{place}", "") for place in range(len(several))]
+        for place, named in enumerate(several):
+            made = Recipe.model_validate(read_yaml(job.inputs[f"{label}/{place}"] / RECIPE)).skill
+            if (made.robot, made.frequency) != (skill.robot, skill.frequency):
+                text = "its skill.robot or skill.frequency is another, and its actions mean something else here"
+                raise StageFailed(f"skill.eval.others.{label}.{place}: {named}: {text}")
+            skills.append((label, str(place), f"{label}/{place}", ""))
     skills += [(f"{asked.label} on {label}", "own", "skill", label) for label in asked.controllers]
     competing = [
         Competitor(label, training, None, load_teacher(job.inputs[name], "robot")[0], controller)

@@ -18,6 +18,11 @@ def test_this_machine_is_fit(tmp_path: Path) -> None:
     assert [finding.name for finding in found.values() if finding.verdict == "bad"] == []
 
 
+def test_a_picture_that_takes_too_long_does_not_make_a_machine_unfit(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(doctor, "PATIENCE", 0.01)
+    assert doctor._process("pictures", "import time; time.sleep(9)", "", "doubtful", "").verdict == "doubtful"
+
+
 @pytest.mark.parametrize("script", ["import os; os.kill(os.getpid(), 11)", "raise ValueError('no')"])
 def test_a_crash_of_the_contact_model_is_essential(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], script: str

@@ -17,6 +17,7 @@ ROOT = Path(__file__).parents[2]
         (("robot-sim", "full", "--mass", "4"), "--mass 4: scene free has no object"),
         (("robot-sim", "full", "--scene", "lift", "--mass", "inf"), "above 0 and at most 1000 kg"),
         (("robot", "full", "--dry-run", "--log", "new.mcap"), "--log new.mcap: --dry-run logs nothing"),
+        (("report", "full", "wbc", "--log", "old.mcap"), "--log: name only the recipe whose export wrote it"),
         (("robot", "nobody"), "nobody: neither an export folder nor a recipe with an export; those with one: "),
         (("play", "full", "--scene", "free", "--mass", "4"), "--mass above 0 and --partner-share need an object"),
         (

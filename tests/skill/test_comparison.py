@@ -57,6 +57,15 @@ def test_who_has_the_smaller_force_in_every_episode_improves_with_certainty() ->
     assert improvement(first, first)[0] == pytest.approx(0.5)
 
 
+def test_an_improvement_is_as_uncertain_as_the_trainings_of_either_side() -> None:
+    made = games({"MAPPO": {"path": 0.0}}, trainings=3, episodes=20).query("known")
+    first = made.assign(partner_force_p90=made["training"].map({"0": 0.1, "1": -0.1, "2": 0.6}))
+    _, low, high = improvement(first, first.assign(partner_force_p90=0.0))
+    assert (low, high) == (0.0, 1.0), "all three may be one of them"
+    _, low, high = improvement(first, first)
+    assert high - low > 0.6
+
+
 def test_tables_tell_held_out_partners_and_unknown_goals_apart() -> None:
     found = {table.name: table for table in tables(games(FORCES), ("tugging",))}
     assert list(found) == ["skill", "skill_partners", "skill_tasks"]

@@ -113,15 +113,15 @@ def improvement(first: pd.DataFrame, other: pd.DataFrame) -> Bootstrapped:
     """Probability that the first has the smaller force in the same episode; ties count half."""
     own, theirs = by_training(first, FORCE), by_training(other, FORCE)
     wins = (own[:, None] < theirs[None]) + 0.5 * (own[:, None] == theirs[None])
-    flat = wins.reshape(-1, wins.shape[-1])
-    drawn = flat[_resamples(*flat.shape)].mean(axis=(1, 2))
+    (ours, episodes), (others, _) = _resamples(*own.shape), _resamples(*theirs.shape, seed=1)
+    drawn = wins[ours[..., None], others.swapaxes(1, 2)[..., None], episodes[:, None]].mean(axis=(1, 2, 3))
     return bootstrapped(wins.mean(), drawn)
 
 
 @cache
-def _resamples(trainings: int, units: int) -> tuple[Indices, Indices]:
+def _resamples(trainings: int, units: int, seed: int = 0) -> tuple[Indices, Indices]:
     """Trainings (RESAMPLES, trainings, 1) and episodes (RESAMPLES, 1, units) of each resample, with replacement."""
-    generator = np.random.default_rng(0)
+    generator = np.random.default_rng(seed)
     drawn = [[generator.integers(n, size=n) for n in (trainings, units)] for _ in range(RESAMPLES)]
     chosen, episodes = (np.stack(rows) for rows in zip(*drawn, strict=True))
     return chosen[:, :, None], episodes[:, None, :]
