@@ -48,6 +48,33 @@ def test_a_resumed_training_ends_bit_for_bit_where_an_unbroken_one_does(
         np.testing.assert_array_equal(found[name], value, err_msg=name)
 
 
+def test_a_group_goes_on_with_the_return_of_its_leader(monkeypatch: pytest.MonkeyPatch) -> None:
+    some, copied = training(group=4), []
+    some.update()
+    before, copy = some.model.normalization.discounted.copy(), some.model.env.copy
+    monkeypatch.setattr(some.model.env, "copy", lambda leaders: copied.append(leaders) or copy(leaders))
+    kept = some.model.normalization.reward
+    seen = []
+    monkeypatch.setattr(
+        some.model.normalization,
+        "reward",
+        lambda *step: seen.append(some.model.normalization.discounted.copy()) or kept(*step),
+    )
+    some.update()
+    assert np.array_equal(seen[0], before[copied[0]])
+    assert len(set(copied[0])) == 2
+
+
+def test_a_training_from_another_policy_begins_within_its_own_exploration() -> None:
+    given, _ = training(initial_std=0.5).network()
+    some = training(initial_std=0.1, std_half_life=None, std_end=0.1)
+    some.begin(given)
+    own = training(initial_std=0.1, std_half_life=16 * 8, std_end=0.1)
+    own.begin(given)
+    assert own.model.policy.log_std.exp().max().item() == pytest.approx(0.1)
+    assert some.model.policy.log_std.exp().max().item() == pytest.approx(0.5), "without a half-life there is no ceiling"
+
+
 class Lottery(PointMasses):
     """Rewards that do not depend on actions."""
 

@@ -8,10 +8,11 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import pytest
 from fake_stages import STARTED
 from workplace import SLOW, Workplace, until
 
-from iowbc.commands.points import PointProcess
+from iowbc.commands.points import PointProcess, PointThread
 from iowbc.commands.process import RunEnding
 from iowbc.pipeline.store.locks import holder
 from iowbc.pipeline.tracking.journal import events
@@ -124,6 +125,17 @@ def test_mlflow_is_told_of_a_run_above_those_of_the_points(workplace: Workplace)
     ]
     assert "runs" not in told[above][-2]["paths"][0]
     assert told[above][-1]["status"] == "FINISHED"
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_a_point_whose_log_cannot_be_written_fails(tmp_path: Path) -> None:
+    task: Any = SimpleNamespace(name="point", log=tmp_path / "missing" / "log", carried_out=lambda log: RunEnding(0))
+    point = PointThread(task, lambda: None)
+    point.join()
+    ending = point.ending()
+    assert ending is not None
+    assert ending.code != 0
+    assert "cannot be written" in ending.failure
 
 
 def test_an_ending_with_many_artifacts_does_not_fill_the_pipe(tmp_path: Path) -> None:
