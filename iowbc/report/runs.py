@@ -14,6 +14,9 @@ from iowbc.recipe.recipe import SEEDS
 from iowbc.results.table import ABSENT, Cell, Column, MeanCell, Table, heads
 from iowbc.stages.registry import STAGES
 
+AMOUNT = ("eval.trials.", "eval.robustness.", "eval.map.")
+"""How much an evaluation plays: trainings of one variant may differ in it."""
+
 
 @dataclass(frozen=True)
 class Run:
@@ -142,27 +145,38 @@ def _steps_of(run: Run, stage: str) -> int | None:
 
 
 def _of_one_variant(first: Run, second: Run) -> bool:
-    """True if two runs differ only in their seeds: in their recipes or, if both are evaluated, in the ingredients of
-    their artifacts' keys, which also match for recipes recorded by different versions of the program. Runs of one seed
-    differ in what they begin from."""
-    recipe = _seedless(first.recipe)
-    if recipe and recipe == _seedless(second.recipe):
+    """True if two runs differ only in their seeds, and then perhaps in how much is evaluated: in their recipes or, if
+    both are evaluated, in the ingredients of their artifacts' keys, which also match for recipes recorded by different
+    versions of the program. Runs of one seed differ in what they begin from."""
+    recipes = [_seedless(run.recipe) for run in (first, second)]
+    seeds = [_seeds(run.recipe) for run in (first, second)]
+    if recipes[0] and recipes[0] == recipes[1]:
+        return True
+    if all(recipes) and _method(recipes[0]) == _method(recipes[1]) and seeds[0] != seeds[1]:
         return True
     shared = sorted(first.artifacts.keys() & second.artifacts.keys())
 
     def made(run: Run) -> tuple[tuple[Any, ...], list[Any]]:
         """Label, robots and recipes without seeds, which must be equal; and the seeds."""
         keyed = [run.artifacts[stage].ingredients for stage in shared]
-        recipes = [one.get("recipe", {}) for one in keyed]
-        seeds = [flattened(one).get(path) for one in recipes for path in SEEDS]
+        own = [one.get("recipe", {}) for one in keyed]
         label, robots = run.recipe.get("eval", {}).get("label"), [one.get("robot") for one in keyed]
-        return (label, robots, [_seedless(one) for one in recipes]), seeds
+        return (label, robots, [_method(_seedless(one)) for one in own]), [_seeds(one) for one in own]
 
-    (alike, seeds), (other, others) = made(first), made(second)
-    return "eval" in shared and all(alike[-1]) and alike == other and seeds != others
+    (alike, drawn), (other, others) = made(first), made(second)
+    return "eval" in shared and all(alike[-1]) and alike == other and drawn != others
+
+
+def _seeds(recipe: Mapping[str, Any]) -> list[Any]:
+    return [flattened(recipe).get(path) for path in SEEDS]
 
 
 def _seedless(recipe: Mapping[str, Any]) -> dict[str, Any]:
     """The values of a recipe by dotted path, without its seeds, name, description and execution."""
     own = {name: value for name, value in recipe.items() if name not in ("name", "description", "execution")}
     return {path: value for path, value in flattened(own).items() if path not in SEEDS} if own else {}
+
+
+def _method(values: Mapping[str, Any]) -> dict[str, Any]:
+    """The values without `AMOUNT`."""
+    return {path: value for path, value in values.items() if not f"{path}.".startswith(AMOUNT)}

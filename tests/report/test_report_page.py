@@ -18,6 +18,7 @@ from iowbc.learning.curves import TABLE
 from iowbc.pipeline.store.artifact import Manifest, write_manifest
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
+from iowbc.recipe.reading.loading import load_recipe
 from iowbc.report.curves import MOST_POINTS, evaluation_panels, learning_figure, learning_panels
 from iowbc.report.page import write_page
 from iowbc.report.runs import Run, grouped, metrics_table
@@ -333,6 +334,13 @@ def test_a_phone_without_a_network_draws_every_curve(runs: list[Run], tmp_path: 
 def test_a_run_alone_has_the_seed_of_its_training() -> None:
     recipe = {"seed": 0, "skill": {"learning": {"seed": None}}, "teacher": {"seed": 1}}
     assert grouped([Run("second", {}, recipe)])[0].seeds == ("1",)
+
+
+def test_a_second_training_with_fewer_trials_is_of_the_same_variant() -> None:
+    folder = Path(__file__).parents[2] / "recipes"
+    recipes = [load_recipe(folder / f"{name}.yaml").recipe for name in ("full", "full_seed_1", "blind")]
+    groups = grouped([Run(one.name, {}, one.model_dump(mode="json")) for one in recipes])
+    assert [group.seeds for group in groups] == [("0", "1"), ("0",)]
 
 
 def test_trainings_of_the_skill_that_differ_in_their_seed_are_one_variant() -> None:
